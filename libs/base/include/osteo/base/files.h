@@ -1,0 +1,58 @@
+// Files that are written whole or not at all, read with errors that say what is wrong, and hashed.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace osteo {
+
+namespace fs = std::filesystem;
+
+/// Reads a whole file. Error(no_input) when it is missing, Error(cannot_read) when it may not be read.
+[[nodiscard]] std::vector<std::byte> read_file(const fs::path& path);
+[[nodiscard]] std::string read_text(const fs::path& path);
+/// Checks that `path` exists (Error no_input) and may be read (Error cannot_read).
+void require_readable(const fs::path& path);
+
+/// Calls `write` with a temporary path beside `path`, syncs it, then renames it over `path`. When `write` throws, or the
+/// process is stopped, `path` is as it was. The temporary keeps the suffix of `path`, so writers that look at it work.
+/// Errors: cannot_write, with the reason (disk full, permission, ...).
+void write_atomically(const fs::path& path, const std::function<void(const fs::path& temporary)>& write);
+void write_file(const fs::path& path, std::string_view content);
+
+/// The same for a folder: `fill` fills a temporary folder, which then takes the place of `path`. `path` may exist only as
+/// an empty folder, or as any folder when `replace` is true.
+void write_folder_atomically(const fs::path& path, bool replace, const std::function<void(const fs::path& temporary)>& fill);
+
+/// Removes the temporaries of this process. Async-signal-unsafe: call it on the way out, not in a handler.
+void remove_temporaries() noexcept;
+
+/// 128-bit XXH3 of the bytes, as 32 hex digits. Not cryptographic: it tells change, not tampering.
+[[nodiscard]] std::string hash_bytes(std::span<const std::byte> bytes);
+[[nodiscard]] std::string hash_text(std::string_view text);
+/// Content hash of a file, or of all files in a folder (by content, in sorted order of their hashes; names do not count).
+[[nodiscard]] std::string hash_path(const fs::path& path);
+
+/// Incremental form of hash_bytes.
+class Hasher {
+ public:
+  Hasher();
+  ~Hasher();
+  Hasher(const Hasher&) = delete;
+  Hasher& operator=(const Hasher&) = delete;
+  void add(const void* data, std::size_t bytes);
+  [[nodiscard]] std::string hex() const;
+
+ private:
+  void* state_;
+};
+
+/// Peak resident memory of this process so far, in MB (10^6 bytes).
+[[nodiscard]] double peak_memory_mb();
+
+}  // namespace osteo

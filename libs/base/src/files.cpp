@@ -1,0 +1,234 @@
+#include "osteo/base/files.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <mutex>
+#include <set>
+
+#include "osteo/base/error.h"
+
+namespace osteo {
+namespace {
+
+// Temporaries in flight, so that a cancelled run can remove what it was writing.
+std::mutex g_temporaries_mutex;
+std::set<fs::path>& temporaries() {
+  static std::set<fs::path> set;
+  return set;
+}
+
+class Temporary {
+ public:
+  explicit Temporary(const fs::path& target) {
+    static std::atomic<int> counter{0};
+    const std::string suffix = target.filename().string();
+    path_ = target.parent_path() / (".osteo-tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + "-" + suffix);
+    const std::lock_guard lock(g_temporaries_mutex);
+    temporaries().insert(path_);
+  }
+  ~Temporary() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+    const std::lock_guard lock(g_temporaries_mutex);
+    temporaries().erase(path_);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+[[noreturn]] void throw_write_error(const fs::path& path, int error) {
+  std::string advice;
+  if (error == ENOSPC || error == EDQUOT) advice = "free some space, or write to another disk";
+  if (error == EACCES || error == EPERM || error == EROFS) advice = "choose a folder that you may write to";
+  if (error == ENOENT) advice = "create the folder first";
+  throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(error), advice);
+}
+
+void sync_path(const fs::path& path, const fs::path& shown) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) throw_write_error(shown, errno);
+  const int rc = ::fsync(fd);
+  const int error = errno;
+  ::close(fd);
+  // Some file systems cannot sync folders; that is no reason to lose a result.
+  if (rc != 0 && error != EINVAL && error != ENOTSUP) throw_write_error(shown, error);
+}
+
+void prepare_parent(const fs::path& path) {
+  const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code ec;
+  if (!fs::is_directory(parent, ec)) {
+    throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': there is no folder '" + parent.string() + "'",
+                "create the folder first");
+  }
+  if (::access(parent.c_str(), W_OK) != 0) throw_write_error(path, errno);
+}
+
+}  // namespace
+
+void require_readable(const fs::path& path) {
+  std::error_code ec;
+  const auto status = fs::status(path, ec);
+  if (ec && ec.value() == EACCES) {
+    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied");
+  }
+  if (!fs::exists(status)) throw Error(ExitCode::no_input, "there is no file or folder '" + path.string() + "'");
+  const int mode = fs::is_directory(status) ? R_OK | X_OK : R_OK;
+  // Root passes access() on files without any read bit. A file nobody may read is refused for root as well: the hospital
+  // server that runs as root should behave like the workstation where the case was tried.
+  const bool no_read_bit = (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) ==
+                           fs::perms::none;
+  if (::access(path.c_str(), mode) != 0 || no_read_bit) {
+    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied",
+                "ask the owner for read permission");
+  }
+}
+
+std::vector<std::byte> read_file(const fs::path& path) {
+  require_readable(path);
+  if (fs::is_directory(path)) throw Error(ExitCode::cannot_read, "'" + path.string() + "' is a folder, not a file");
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': " + std::strerror(errno));
+  std::vector<std::byte> bytes(static_cast<std::size_t>(in.tellg()));
+  in.seekg(0);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!in) throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': " + std::strerror(errno));
+  return bytes;
+}
+
+std::string read_text(const fs::path& path) {
+  const auto bytes = read_file(path);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void write_atomically(const fs::path& path, const std::function<void(const fs::path&)>& write) {
+  prepare_parent(path);
+  const Temporary temporary(path);
+  write(temporary.path());
+  sync_path(temporary.path(), path);
+  if (::rename(temporary.path().c_str(), path.c_str()) != 0) throw_write_error(path, errno);
+}
+
+void write_file(const fs::path& path, std::string_view content) {
+  write_atomically(path, [&](const fs::path& temporary) {
+    const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd < 0) throw_write_error(path, errno);
+    std::size_t done = 0;
+    while (done < content.size()) {
+      const ssize_t n = ::write(fd, content.data() + done, content.size() - done);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) {
+        const int error = errno;
+        ::close(fd);
+        throw_write_error(path, error);
+      }
+      done += static_cast<std::size_t>(n);
+    }
+    if (::close(fd) != 0) throw_write_error(path, errno);
+  });
+}
+
+void write_folder_atomically(const fs::path& path, bool replace, const std::function<void(const fs::path&)>& fill) {
+  const fs::path target = path.has_filename() ? path : path.parent_path();
+  prepare_parent(target);
+  if (fs::exists(target) && !replace && !(fs::is_directory(target) && fs::is_empty(target))) {
+    throw Error(ExitCode::cannot_write, "'" + target.string() + "' exists already", "give another name, or --force to replace it");
+  }
+  const Temporary temporary(target);
+  std::error_code ec;
+  fs::create_directory(temporary.path(), ec);
+  if (ec) throw_write_error(target, ec.value());
+  fill(temporary.path());
+  sync_path(temporary.path(), target);
+  if (fs::exists(target)) {
+    const Temporary old(target);
+    fs::rename(target, old.path(), ec);
+    if (ec) throw_write_error(target, ec.value());
+    fs::rename(temporary.path(), target, ec);
+    if (ec) {
+      const int error = ec.value();
+      fs::rename(old.path(), target, ec);
+      throw_write_error(target, error);
+    }
+    return;
+  }
+  fs::rename(temporary.path(), target, ec);
+  if (ec) throw_write_error(target, ec.value());
+}
+
+void remove_temporaries() noexcept {
+  const std::lock_guard lock(g_temporaries_mutex);
+  for (const fs::path& path : temporaries()) {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+}
+
+Hasher::Hasher() : state_(XXH3_createState()) { XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_)); }
+Hasher::~Hasher() { XXH3_freeState(static_cast<XXH3_state_t*>(state_)); }
+void Hasher::add(const void* data, std::size_t bytes) {
+  XXH3_128bits_update(static_cast<XXH3_state_t*>(state_), data, bytes);
+}
+
+std::string Hasher::hex() const {
+  const XXH128_hash_t h = XXH3_128bits_digest(static_cast<const XXH3_state_t*>(state_));
+  XXH128_canonical_t canonical;
+  XXH128_canonicalFromHash(&canonical, h);
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const unsigned char byte : canonical.digest) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+std::string hash_bytes(std::span<const std::byte> bytes) {
+  Hasher h;
+  h.add(bytes.data(), bytes.size());
+  return h.hex();
+}
+
+std::string hash_text(std::string_view text) { return hash_bytes(std::as_bytes(std::span(text.data(), text.size()))); }
+
+std::string hash_path(const fs::path& path) {
+  require_readable(path);
+  if (!fs::is_directory(path)) {
+    std::ifstream in(path, std::ios::binary);
+    Hasher h;
+    std::vector<char> buffer(1 << 20);
+    while (in) {
+      in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+      h.add(buffer.data(), static_cast<std::size_t>(in.gcount()));
+    }
+    return h.hex();
+  }
+  std::vector<std::string> hashes;
+  for (const auto& entry : fs::recursive_directory_iterator(path)) {
+    if (entry.is_regular_file()) hashes.push_back(hash_path(entry.path()));
+  }
+  std::sort(hashes.begin(), hashes.end());
+  std::string all;
+  for (const auto& h : hashes) all += h;
+  return hash_text(all);
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) * 1024.0 / 1e6;
+}
+
+}  // namespace osteo

@@ -1,0 +1,36 @@
+// A dense block of voxels. A value: copies share the voxels, which nobody changes once the volume is made.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "osteo/data/frame.h"
+
+namespace osteo {
+
+template <class T>
+struct Volume {
+  Frame frame;
+  std::shared_ptr<const T[]> voxels;  ///< x fastest, then y, then z; frame.voxel_count() of them
+
+  [[nodiscard]] std::span<const T> span() const { return {voxels.get(), frame.voxel_count()}; }
+  [[nodiscard]] std::size_t offset(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(frame.dims[0]) +
+           static_cast<std::size_t>(i);
+  }
+  [[nodiscard]] T at(int i, int j, int k) const { return voxels[offset(i, j, k)]; }
+};
+
+/// CT in Hounsfield units, rounded to whole HU.
+using Image = Volume<std::int16_t>;
+/// 0 is background; a mask has only 1 besides; a label map has one value a structure.
+using Labels = Volume<std::uint8_t>;
+
+/// Uninitialised voxels to fill before they become a Volume.
+template <class T>
+[[nodiscard]] std::shared_ptr<T[]> make_voxels(std::size_t count) {
+  return std::make_shared_for_overwrite<T[]>(count);
+}
+
+}  // namespace osteo

@@ -1,0 +1,92 @@
+// Voxels in bricks of 8^3 behind a flat table: the form in which bone is drilled and its surface made.
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "osteo/data/frame.h"
+#include "osteo/data/sparse_grid.h"
+
+namespace osteo {
+
+struct Ijk {
+  int i = 0, j = 0, k = 0;
+  friend bool operator==(Ijk, Ijk) = default;
+};
+
+/// A name for one stored voxel: brick number times 512 plus the place in the brick (x fastest).
+using VoxelKey = std::uint32_t;
+
+/// The set of bricks is fixed when the grid is made; values may change. A voxel outside every brick reads as 0.
+/// One thread writes (`set`), others may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old
+/// or new values, never torn ones.
+/// Memory: 4 bytes a voxel of each brick, plus 4 bytes for each brick of the bounding box.
+class BrickGrid {
+ public:
+  static constexpr int kEdge = 8;
+  static constexpr int kVoxels = kEdge * kEdge * kEdge;
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+
+  BrickGrid() = default;
+  /// All-zero bricks at the given brick coordinates (>= 0, each at most once, any order; they are sorted z, y, x).
+  BrickGrid(Frame frame, std::vector<Ijk> bricks);
+  BrickGrid(const BrickGrid& other);
+  BrickGrid(BrickGrid&&) noexcept = default;
+  BrickGrid& operator=(BrickGrid&&) noexcept = default;
+
+  [[nodiscard]] const Frame& frame() const { return frame_; }
+  [[nodiscard]] std::size_t brick_count() const { return origins_.size(); }
+  [[nodiscard]] Ijk brick_coordinate(std::uint32_t brick) const { return origins_[brick]; }
+  /// kNone when there is no such brick.
+  [[nodiscard]] std::uint32_t find_brick(int bi, int bj, int bk) const {
+    if (static_cast<unsigned>(bi) >= extent_[0] || static_cast<unsigned>(bj) >= extent_[1] || static_cast<unsigned>(bk) >= extent_[2]) return kNone;
+    return table_[(static_cast<std::size_t>(bk) * extent_[1] + static_cast<std::size_t>(bj)) * extent_[0] + static_cast<std::size_t>(bi)];
+  }
+  [[nodiscard]] static constexpr std::uint32_t offset_in_brick(int i, int j, int k) {
+    return static_cast<std::uint32_t>((i & 7) | (j & 7) << 3 | (k & 7) << 6);
+  }
+  /// kNone when the voxel is not stored.
+  [[nodiscard]] VoxelKey find(int i, int j, int k) const {
+    const std::uint32_t b = find_brick(i >> 3, j >> 3, k >> 3);
+    return b == kNone ? kNone : b * kVoxels + offset_in_brick(i, j, k);
+  }
+  [[nodiscard]] Ijk coordinate(VoxelKey key) const {
+    const Ijk b = origins_[key / kVoxels];
+    const int o = static_cast<int>(key % kVoxels);
+    return {b.i * 8 + (o & 7), b.j * 8 + (o >> 3 & 7), b.k * 8 + (o >> 6)};
+  }
+  [[nodiscard]] float value(VoxelKey key) const {
+    return std::atomic_ref<float>(values_[key]).load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] float at(int i, int j, int k) const {
+    const VoxelKey key = find(i, j, k);
+    return key == kNone ? 0.0F : value(key);
+  }
+  void set(VoxelKey key, float v) { std::atomic_ref<float>(values_[key]).store(v, std::memory_order_relaxed); }
+
+  /// Copies the block of voxels [lo, lo + n) into `out`, x fastest; voxels that are not stored are 0.
+  void read_block(Ijk lo, std::array<int, 3> n, float* out) const;
+  /// Sum over all voxels in brick order: the same for the same content.
+  [[nodiscard]] double sum() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+  /// Content hash of frame, bricks and values.
+  [[nodiscard]] std::string hash() const;
+
+ private:
+  Frame frame_;
+  std::array<std::uint32_t, 3> extent_{0, 0, 0};  // bricks along each axis
+  std::vector<std::uint32_t> table_;
+  std::vector<Ijk> origins_;  // in bricks
+  std::unique_ptr<float[]> values_;
+};
+
+/// All leaves that hold a value > 0. O(stored voxels).
+[[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid);
+/// Bricks with only zeros are left out; equal values come back bit for bit.
+[[nodiscard]] SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name);
+
+}  // namespace osteo

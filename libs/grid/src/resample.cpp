@@ -1,0 +1,325 @@
+#include "osteo/grid/resample.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
+#include "osteo/grid/brick_grid.h"
+#include "vdb.h"
+
+namespace osteo {
+namespace {
+
+constexpr int kEdge = BrickGrid::kEdge;
+constexpr int kVoxels = BrickGrid::kVoxels;
+
+// Just inside or outside, for voxels whose HU and mask disagree: half the contrast of a mid-grey voxel would move the
+// boundary by much, one HU would put a fill's boundary on its voxel centres.
+constexpr float kForcedHu = 100;
+
+// HU above the boundary, negative outside bone.
+std::vector<float> signed_field(const Image& ct, const Labels& mask, double lower) {
+  std::vector<float> field(ct.frame.voxel_count());
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const float d = static_cast<float>(ct.voxels[i]) - static_cast<float>(lower);
+    field[i] = mask.voxels[i] != 0 ? (d >= 0 ? d : kForcedHu) : (d < 0 ? d : -kForcedHu);
+  }
+  return field;
+}
+
+// Where the sample points of the output lie between the samples of the CT, along one axis.
+struct AxisMap {
+  int sub = 1;                  // sub-voxels along an output voxel
+  std::vector<int> i0, i1;      // CT neighbours, one pair a sub-voxel
+  std::vector<float> t;         // weight of i1
+  std::vector<float> slope;     // of t per mm; 0 where clamped at the border
+};
+
+AxisMap make_axis(int ct_dim, double ct_spacing, int out_dim, double out_spacing) {
+  AxisMap m;
+  m.sub = std::max(1, static_cast<int>(std::ceil(out_spacing / ct_spacing - 1e-6)));
+  const double h = out_spacing / m.sub;
+  for (int s = 0; s < out_dim * m.sub; ++s) {
+    const double x = (-0.5 * ct_spacing + (s + 0.5) * h) / ct_spacing;
+    const int i = std::clamp(static_cast<int>(std::floor(x)), 0, std::max(0, ct_dim - 2));
+    const double t = std::clamp(x - i, 0.0, 1.0);
+    m.i0.push_back(i);
+    m.i1.push_back(std::min(i + 1, ct_dim - 1));
+    m.t.push_back(static_cast<float>(t));
+    m.slope.push_back(t == x - i && ct_dim > 1 ? static_cast<float>(1 / ct_spacing) : 0.0F);
+  }
+  return m;
+}
+
+class Resampler {
+ public:
+  Resampler(const Image& ct, const Labels& mask, const ResampleParams& p) : ct_(ct), field_(signed_field(ct, mask, p.lower)), h_(p.spacing_mm) {
+    frame_.direction = ct.frame.direction;
+    frame_.spacing_mm = {h_, h_, h_};
+    Vec3 first;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double extent = ct.frame.dims[a] * ct.frame.spacing_mm[a];
+      frame_.dims[a] = std::max(1, static_cast<int>(std::ceil(extent / h_ - 1e-6)));
+      axis_[a] = make_axis(ct.frame.dims[a], ct.frame.spacing_mm[a], frame_.dims[a], h_);
+      first[a] = -0.5 + 0.5 * h_ / ct.frame.spacing_mm[a];
+    }
+    frame_.origin_mm = ct.frame.world_from_index(first);
+    find_occupied_blocks();
+    find_bricks();
+  }
+
+  [[nodiscard]] const Frame& frame() const { return frame_; }
+  [[nodiscard]] const std::vector<Ijk>& bricks() const { return bricks_; }
+
+  // Calls take(voxel in brick, signed HU, HU of a full ramp across the sub-voxel, weight) for each sub-voxel of a brick.
+  template <class F>
+  void sample_brick(Ijk brick, F&& take) const {
+    const auto nx = static_cast<std::size_t>(ct_.frame.dims[0]), ny = static_cast<std::size_t>(ct_.frame.dims[1]);
+    const auto &ax = axis_[0], &ay = axis_[1], &az = axis_[2];
+    const float weight = 1.0F / static_cast<float>(ax.sub * ay.sub * az.sub);
+    const float hx = static_cast<float>(h_ / ax.sub), hy = static_cast<float>(h_ / ay.sub), hz = static_cast<float>(h_ / az.sub);
+    const auto limit = [&](std::size_t a, int b) { return std::min(kEdge, frame_.dims[a] - b * kEdge); };
+    for (int k = 0; k < limit(2, brick.k) * az.sub; ++k) {
+      const auto sk = static_cast<std::size_t>(brick.k * kEdge * az.sub + k);
+      const std::size_t z0 = static_cast<std::size_t>(az.i0[sk]) * ny, z1 = static_cast<std::size_t>(az.i1[sk]) * ny;
+      const float tz = az.t[sk];
+      for (int j = 0; j < limit(1, brick.j) * ay.sub; ++j) {
+        const auto sj = static_cast<std::size_t>(brick.j * kEdge * ay.sub + j);
+        const auto y0 = static_cast<std::size_t>(ay.i0[sj]), y1 = static_cast<std::size_t>(ay.i1[sj]);
+        const float ty = ay.t[sj];
+        const float* const r00 = field_.data() + (z0 + y0) * nx;
+        const float* const r10 = field_.data() + (z0 + y1) * nx;
+        const float* const r01 = field_.data() + (z1 + y0) * nx;
+        const float* const r11 = field_.data() + (z1 + y1) * nx;
+        for (int i = 0; i < limit(0, brick.i) * ax.sub; ++i) {
+          const auto si = static_cast<std::size_t>(brick.i * kEdge * ax.sub + i);
+          const auto x0 = static_cast<std::size_t>(ax.i0[si]), x1 = static_cast<std::size_t>(ax.i1[si]);
+          const float tx = ax.t[si];
+          const float c00 = r00[x0] + (r00[x1] - r00[x0]) * tx, c10 = r10[x0] + (r10[x1] - r10[x0]) * tx;
+          const float c01 = r01[x0] + (r01[x1] - r01[x0]) * tx, c11 = r11[x0] + (r11[x1] - r11[x0]) * tx;
+          const float c0 = c00 + (c10 - c00) * ty, c1 = c01 + (c11 - c01) * ty;
+          const float value = c0 + (c1 - c0) * tz;
+          // The trilinear gradient, as the change across the sub-voxel along each axis.
+          const float gz = (c1 - c0) * az.slope[sk] * hz;
+          const float gy = ((c10 - c00) + ((c11 - c01) - (c10 - c00)) * tz) * ay.slope[sj] * hy;
+          const float d0 = (r00[x1] - r00[x0]) + ((r10[x1] - r10[x0]) - (r00[x1] - r00[x0])) * ty;
+          const float d1 = (r01[x1] - r01[x0]) + ((r11[x1] - r11[x0]) - (r01[x1] - r01[x0])) * ty;
+          const float gx = (d0 + (d1 - d0) * tz) * ax.slope[si] * hx;
+          // A plane cuts a cube over a width between the 2-norm and the 1-norm of this change.
+          const float ramp = 0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
+          take(BrickGrid::offset_in_brick(i / ax.sub, j / ay.sub, k / az.sub), value, std::max(ramp, 1e-3F), weight);
+        }
+      }
+    }
+  }
+
+  // HU at the centre of an output voxel.
+  [[nodiscard]] float hu_at(Ijk brick, std::uint32_t voxel) const {
+    const int v[3] = {brick.i * 8 + static_cast<int>(voxel & 7), brick.j * 8 + static_cast<int>(voxel >> 3 & 7), brick.k * 8 + static_cast<int>(voxel >> 6)};
+    double x[3];
+    int lo[3];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double spacing = ct_.frame.spacing_mm[a];
+      const double c = std::clamp((-0.5 * spacing + (v[a] + 0.5) * h_) / spacing, 0.0, ct_.frame.dims[a] - 1.0);
+      lo[a] = std::min(static_cast<int>(c), std::max(0, ct_.frame.dims[a] - 2));
+      x[a] = c - lo[a];
+    }
+    double sum = 0;
+    for (int c = 0; c < 8; ++c) {
+      const double w = ((c & 1) != 0 ? x[0] : 1 - x[0]) * ((c & 2) != 0 ? x[1] : 1 - x[1]) * ((c & 4) != 0 ? x[2] : 1 - x[2]);
+      if (w > 0) sum += w * ct_.at(lo[0] + (c & 1), lo[1] + (c >> 1 & 1), lo[2] + (c >> 2));
+    }
+    return static_cast<float>(std::floor(sum + 0.5));
+  }
+
+ private:
+  static constexpr int kBlock = 4;
+
+  void find_occupied_blocks() {
+    for (std::size_t a = 0; a < 3; ++a) blocks_[a] = (ct_.frame.dims[a] + kBlock - 1) / kBlock;
+    occupied_.assign(static_cast<std::size_t>(blocks_[0]) * static_cast<std::size_t>(blocks_[1]) * static_cast<std::size_t>(blocks_[2]), 0);
+    std::size_t at = 0;
+    for (int k = 0; k < ct_.frame.dims[2]; ++k) {
+      for (int j = 0; j < ct_.frame.dims[1]; ++j) {
+        std::uint8_t* const row = occupied_.data() + (static_cast<std::size_t>(k / kBlock) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(j / kBlock)) * static_cast<std::size_t>(blocks_[0]);
+        for (int i = 0; i < ct_.frame.dims[0]; ++i, ++at) {
+          if (field_[at] > -kForcedHu) row[i / kBlock] = 1;
+        }
+      }
+    }
+  }
+
+  void find_bricks() {
+    std::array<int, 3> n{};
+    for (std::size_t a = 0; a < 3; ++a) n[a] = (frame_.dims[a] + kEdge - 1) / kEdge;
+    const auto range = [&](std::size_t a, int b) {
+      const auto& m = axis_[a];
+      const int last = std::min((b + 1) * kEdge, frame_.dims[a]) * m.sub - 1;
+      return std::pair{m.i0[static_cast<std::size_t>(b * kEdge * m.sub)] / kBlock, m.i1[static_cast<std::size_t>(last)] / kBlock};
+    };
+    for (int k = 0; k < n[2]; ++k) {
+      for (int j = 0; j < n[1]; ++j) {
+        for (int i = 0; i < n[0]; ++i) {
+          const auto [x0, x1] = range(0, i);
+          const auto [y0, y1] = range(1, j);
+          const auto [z0, z1] = range(2, k);
+          bool any = false;
+          for (int z = z0; z <= z1 && !any; ++z) {
+            for (int y = y0; y <= y1 && !any; ++y) {
+              for (int x = x0; x <= x1 && !any; ++x) {
+                any = occupied_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(blocks_[0]) + static_cast<std::size_t>(x)] != 0;
+              }
+            }
+          }
+          if (any) bricks_.push_back({i, j, k});
+        }
+      }
+    }
+  }
+
+  const Image& ct_;
+  std::vector<float> field_;
+  double h_;
+  Frame frame_;
+  std::array<AxisMap, 3> axis_;
+  std::array<int, 3> blocks_{};
+  std::vector<std::uint8_t> occupied_;
+  std::vector<Ijk> bricks_;
+};
+
+// Share of a sub-voxel inside, for a boundary that lies `offset` HU above the threshold.
+float coverage(float value, float ramp, float offset) { return std::clamp(0.5F + (value - offset) / ramp, 0.0F, 1.0F); }
+
+// Volume for a row of offsets at once, summed in brick order.
+constexpr std::array<float, 9> kOffsets{-100, -50, -25, -10, 0, 10, 25, 50, 100};
+
+double find_offset(const Resampler& resampler, double wanted_mm3, const Context& context, double& at_zero_mm3) {
+  const auto& bricks = resampler.bricks();
+  std::vector<std::array<double, kOffsets.size()>> volumes(bricks.size());
+  parallel_for(bricks.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    for (std::size_t b = begin; b < end; ++b) {
+      auto& v = volumes[b];
+      v.fill(0);
+      resampler.sample_brick(bricks[b], [&](std::uint32_t, float value, float ramp, float weight) {
+        if (value - kOffsets.front() < -0.5F * ramp) return;
+        for (std::size_t o = 0; o < kOffsets.size(); ++o) v[o] += static_cast<double>(weight * coverage(value, ramp, kOffsets[o]));
+      });
+    }
+  });
+  const double voxel = resampler.frame().voxel_volume_mm3();
+  std::array<double, kOffsets.size()> total{};
+  for (const auto& v : volumes) {
+    for (std::size_t o = 0; o < total.size(); ++o) total[o] += v[o] * voxel;
+  }
+  at_zero_mm3 = total[4];
+  for (std::size_t o = 0; o + 1 < total.size(); ++o) {
+    if (wanted_mm3 <= total[o] && wanted_mm3 >= total[o + 1]) {
+      const double t = (total[o] - wanted_mm3) / std::max(total[o] - total[o + 1], 1e-12);
+      return static_cast<double>(kOffsets[o]) + t * static_cast<double>(kOffsets[o + 1] - kOffsets[o]);
+    }
+  }
+  return wanted_mm3 > total[0] ? static_cast<double>(kOffsets.front()) : static_cast<double>(kOffsets.back());
+}
+
+}  // namespace
+
+ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& p, const Context& context) {
+  if (!same_place(ct.frame, mask.frame)) {
+    throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT", "make the mask from this CT with 'osteo threshold'");
+  }
+  double voxels = 1;
+  for (std::size_t a = 0; a < 3; ++a) voxels *= std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm);
+  if (voxels > 4e10) {
+    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than 4*10^10", "choose a larger --spacing-mm");
+  }
+  ResampledBone result;
+  result.volume_before_mm3 = static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
+                             ct.frame.voxel_volume_mm3();
+  const Resampler resampler(ct, mask, p);
+  const auto& bricks = resampler.bricks();
+  context.progress(0.1, "boundary");
+  double unshifted = 0;
+  const auto offset = static_cast<float>(find_offset(resampler, result.volume_before_mm3, context, unshifted));
+  context.progress(0.5, "voxels");
+
+  std::vector<std::unique_ptr<float[]>> densities(bricks.size()), values(bricks.size());
+  parallel_for(bricks.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    for (std::size_t b = begin; b < end; ++b) {
+      std::array<float, kVoxels> d{};
+      resampler.sample_brick(bricks[b], [&](std::uint32_t v, float value, float ramp, float weight) { d[v] += weight * coverage(value, ramp, offset); });
+      if (std::none_of(d.begin(), d.end(), [](float x) { return x > 0; })) continue;
+      densities[b] = std::make_unique_for_overwrite<float[]>(kVoxels);
+      values[b] = std::make_unique<float[]>(kVoxels);
+      for (std::uint32_t v = 0; v < kVoxels; ++v) {
+        densities[b][v] = std::min(d[v], 1.0F);
+        if (d[v] > 0) values[b][v] = resampler.hu_at(bricks[b], v);
+      }
+    }
+  });
+  context.progress(0.8, "sparse grid");
+
+  grid::initialize_vdb();
+  auto density = openvdb::FloatGrid::create(0.0F);
+  auto hu = openvdb::FloatGrid::create(-1024.0F);
+  double total = 0;
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    if (!densities[b]) continue;
+    const openvdb::Coord origin(bricks[b].i * kEdge, bricks[b].j * kEdge, bricks[b].k * kEdge);
+    auto* const density_leaf = density->tree().touchLeaf(origin);
+    auto* const hu_leaf = hu->tree().touchLeaf(origin);
+    for (std::uint32_t v = 0; v < kVoxels; ++v) {
+      if (densities[b][v] <= 0) continue;
+      const openvdb::Coord c = origin.offsetBy(static_cast<int>(v & 7), static_cast<int>(v >> 3 & 7), static_cast<int>(v >> 6));
+      density_leaf->setValueOn(c, densities[b][v]);
+      hu_leaf->setValueOn(c, values[b][v]);
+      total += static_cast<double>(densities[b][v]);
+    }
+    densities[b].reset();
+    values[b].reset();
+  }
+  hu->setSaveFloatAsHalf(true);
+  result.volume_after_mm3 = total * resampler.frame().voxel_volume_mm3();
+  result.density = grid::wrap(density, resampler.frame(), "density");
+  result.hu = grid::wrap(hu, resampler.frame(), "hu");
+
+  const double change = 100 * (result.volume_after_mm3 / result.volume_before_mm3 - 1);
+  context.report("volume_before_mm3", result.volume_before_mm3);
+  context.report("volume_after_mm3", result.volume_after_mm3);
+  context.report("volume_change_percent", change);
+  context.report("volume_change_unshifted_percent", 100 * (unshifted / result.volume_before_mm3 - 1));
+  context.report("boundary_offset_hu", static_cast<double>(offset));
+  context.report("bone_voxels", static_cast<std::int64_t>(result.density.active_voxels));
+  context.report("grid_memory_mb", static_cast<double>(result.density.memory_bytes) / 1e6);
+  if (std::abs(change) > 1) {
+    context.warn("the volume of bone changed by " + format_number(std::round(change * 100) / 100) +
+                 " %: the bone is thinner than the voxels of " + format_number(p.spacing_mm) + " mm can hold");
+  }
+  context.progress(1.0);
+  return result;
+}
+
+StageInfo ResampleStage::info() {
+  return {.name = "resample",
+          .version = 1,
+          .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
+          .description =
+              "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "
+              "The volume of bone is kept and reported. Only voxels with bone are stored.",
+          .inputs = {{"image", {DataKind::image}, "CT in HU"}, {"mask", {DataKind::labels}, "bone mask on the same voxels"}},
+          .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
+                      {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
+                         "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
+          .example = "osteo resample ct.nrrd bone.nrrd bone.vdb --spacing-mm 0.5"};
+}
+
+std::vector<Data> ResampleStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  ResampledBone bone = resample_bone(std::get<Image>(inputs[0]), std::get<Labels>(inputs[1]), params, context);
+  return {bone.density, bone.hu};
+}
+
+}  // namespace osteo

@@ -1,0 +1,163 @@
+#include "vdb.h"
+
+#include <mutex>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/grid/brick_grid.h"
+#include "osteo/grid/grid_io.h"
+
+namespace osteo {
+namespace grid {
+
+void initialize_vdb() {
+  static std::once_flag once;
+  std::call_once(once, [] { openvdb::initialize(); });
+}
+
+SparseGrid wrap(openvdb::FloatGrid::Ptr vdb, const Frame& frame, std::string name) {
+  SparseGrid result;
+  result.name = std::move(name);
+  result.frame = frame;
+  result.background = static_cast<double>(vdb->background());
+  result.active_voxels = vdb->activeVoxelCount();
+  result.memory_bytes = vdb->memUsage();
+  vdb->setName(result.name);
+  result.impl = std::make_shared<SparseGrid::Impl>(SparseGrid::Impl{vdb});
+  return result;
+}
+
+}  // namespace grid
+
+namespace {
+
+openvdb::math::Transform::Ptr transform_of(const Frame& f) {
+  // OpenVDB's matrices take row vectors: row a is where index axis a goes.
+  openvdb::math::Mat4d m = openvdb::math::Mat4d::identity();
+  for (int a = 0; a < 3; ++a) {
+    const Vec3 v = f.direction.column[static_cast<std::size_t>(a)] * f.spacing_mm[static_cast<std::size_t>(a)];
+    m(a, 0) = v.x;
+    m(a, 1) = v.y;
+    m(a, 2) = v.z;
+  }
+  m(3, 0) = f.origin_mm.x;
+  m(3, 1) = f.origin_mm.y;
+  m(3, 2) = f.origin_mm.z;
+  return openvdb::math::Transform::createLinearTransform(m);
+}
+
+Frame frame_of(const openvdb::FloatGrid& grid) {
+  Frame f;
+  const auto m = grid.transform().baseMap()->getAffineMap()->getMat4();
+  for (int a = 0; a < 3; ++a) {
+    const Vec3 v{m(a, 0), m(a, 1), m(a, 2)};
+    f.spacing_mm[static_cast<std::size_t>(a)] = length(v);
+    f.direction.column[static_cast<std::size_t>(a)] = normalized(v);
+  }
+  f.origin_mm = {m(3, 0), m(3, 1), m(3, 2)};
+  const auto box = grid.evalActiveVoxelBoundingBox();
+  for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = box.max()[a] + 1;
+  if (const auto meta = grid.getMetadata<openvdb::Vec3IMetadata>("osteo_dims")) {
+    for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = meta->value()[a];
+  }
+  return f;
+}
+
+}  // namespace
+
+BrickGrid to_bricks(const SparseGrid& sparse) {
+  const auto& tree = sparse.impl->grid->tree();
+  std::vector<Ijk> bricks;
+  const auto holds_value = [](const auto& leaf) {
+    for (auto v = leaf.cbeginValueOn(); v; ++v) {
+      if (*v > 0) return true;
+    }
+    return false;
+  };
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const auto o = leaf->origin();
+    if (o.x() < 0 || o.y() < 0 || o.z() < 0) throw Error(ExitCode::corrupt, "the sparse grid has voxels at negative indices");
+    if (holds_value(*leaf)) bricks.push_back({o.x() >> 3, o.y() >> 3, o.z() >> 3});
+  }
+  BrickGrid result(sparse.frame, std::move(bricks));
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const auto o = leaf->origin();
+    const std::uint32_t b = result.find_brick(o.x() >> 3, o.y() >> 3, o.z() >> 3);
+    if (b == BrickGrid::kNone) continue;
+    for (auto v = leaf->cbeginValueOn(); v; ++v) {
+      const auto c = v.getCoord();
+      result.set(b * BrickGrid::kVoxels + BrickGrid::offset_in_brick(c.x(), c.y(), c.z()), *v);
+    }
+  }
+  return result;
+}
+
+SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name) {
+  grid::initialize_vdb();
+  auto vdb = openvdb::FloatGrid::create(0.0F);
+  for (std::uint32_t b = 0; b < bricks.brick_count(); ++b) {
+    const Ijk o = bricks.brick_coordinate(b);
+    openvdb::FloatTree::LeafNodeType* leaf = nullptr;
+    for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
+      const float value = bricks.value(b * BrickGrid::kVoxels + v);
+      if (value == 0) continue;
+      const openvdb::Coord c(o.i * 8 + static_cast<int>(v & 7), o.j * 8 + static_cast<int>(v >> 3 & 7), o.k * 8 + static_cast<int>(v >> 6));
+      if (leaf == nullptr) leaf = vdb->tree().touchLeaf(c);
+      leaf->setValueOn(c, value);
+    }
+  }
+  return grid::wrap(vdb, bricks.frame(), name);
+}
+
+void save_grid(const SparseGrid& sparse, const fs::path& path) {
+  if (path.extension() != ".vdb") throw Error(ExitCode::usage, "cannot write a sparse grid as '" + path.filename().string() + "'", "name it .vdb");
+  grid::initialize_vdb();
+  auto copy = openvdb::FloatGrid::create(*sparse.impl->grid);  // shallow: shares the tree
+  copy->setTransform(transform_of(sparse.frame));
+  copy->setName(sparse.name);
+  const auto& d = sparse.frame.dims;
+  copy->insertMeta("osteo_dims", openvdb::Vec3IMetadata(openvdb::Vec3I(d[0], d[1], d[2])));
+  copy->insertMeta("space", openvdb::StringMetadata("LPS mm"));
+  write_atomically(path, [&](const fs::path& temporary) {
+    try {
+      openvdb::io::File file(temporary.string());
+      file.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+      file.write({copy}, openvdb::MetaMap());
+      file.close();
+    } catch (const openvdb::Exception& e) {
+      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + e.what(), "see that the disk has room");
+    }
+    // OpenVDB does not report a short write: read the file's structure back.
+    try {
+      openvdb::io::File check(temporary.string());
+      check.open(false);
+      if (!check.readGrid(sparse.name)) throw openvdb::IoError("grid is missing");
+    } catch (const openvdb::Exception& e) {
+      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': the file is incomplete (" + e.what() + ")",
+                  "free some space, or write to another disk");
+    }
+  });
+}
+
+SparseGrid load_grid(const fs::path& path) {
+  require_readable(path);
+  grid::initialize_vdb();
+  try {
+    openvdb::io::File file(path.string());
+    file.open(false);
+    for (auto name = file.beginName(); name != file.endName(); ++name) {
+      const auto base = file.readGrid(name.gridName());
+      const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+      if (!floats) continue;
+      Frame frame = frame_of(*floats);
+      require_valid(frame);
+      return grid::wrap(floats, frame, floats->getName());
+    }
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' holds no grid of floats");
+  } catch (const openvdb::Exception& e) {
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: " + e.what(),
+                "the file may be cut short; make it again");
+  }
+}
+
+}  // namespace osteo

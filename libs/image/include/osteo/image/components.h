@@ -1,0 +1,34 @@
+// Connected components of a mask, as runs of voxels.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "osteo/base/param.h"
+
+namespace osteo {
+
+/// face: 6 neighbours; full: 26 neighbours.
+enum class Connectivity : int { face, full };
+template <>
+struct EnumNames<Connectivity> {
+  static constexpr std::array<std::string_view, 2> values{"face", "full"};
+};
+
+struct Run {
+  std::uint32_t begin, end;  ///< x range [begin, end) in row `row`
+  std::uint32_t row;         ///< y + z * dims[1]
+};
+
+struct Components {
+  std::vector<Run> runs;
+  std::vector<std::uint32_t> component;  ///< one a run; numbered by first voxel in scan order
+  std::vector<std::uint64_t> voxels;     ///< one a component
+};
+
+/// Components of the voxels equal to `value` (0: background, 1: mask). O(voxels); memory O(runs).
+[[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims,
+                                              std::uint8_t value, Connectivity connectivity);
+
+}  // namespace osteo

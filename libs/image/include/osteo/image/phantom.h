@@ -1,0 +1,74 @@
+// A head with temporal bones whose every boundary is known exactly: the embedded default case and the truth of tests.
+#pragma once
+#include <cstdint>
+#include <string_view>
+
+#include "osteo/data/volume.h"
+#include "osteo/stage/stage.h"
+
+namespace osteo {
+
+/// Label values of the phantom. Bone is `is_bone(label)`.
+enum class Tissue : std::uint8_t {
+  air = 0,
+  soft = 1,
+  cortical = 2,
+  cellular = 3,
+  mandible = 4,
+  ossicle = 5,
+  facial_nerve = 6,
+  sigmoid_sinus = 7,
+  left_marker = 8,  ///< a bead on the patient's left side only: tells left from right
+};
+inline constexpr int kTissueCount = 9;
+[[nodiscard]] std::string_view tissue_name(Tissue tissue);
+[[nodiscard]] double tissue_hu(Tissue tissue);
+[[nodiscard]] constexpr bool is_bone(Tissue t) {
+  return t == Tissue::cortical || t == Tissue::cellular || t == Tissue::mandible || t == Tissue::ossicle || t == Tissue::left_marker;
+}
+
+/// The exact tissue at a point; the head's centre is the origin. O(1), about 0.1 us.
+[[nodiscard]] Tissue phantom_tissue(Vec3 lps_mm);
+
+/// A point on the outside of the left mastoid and the inward direction there: where a mastoidectomy begins.
+struct PhantomEntry {
+  Vec3 point_mm, inward;
+};
+[[nodiscard]] PhantomEntry phantom_left_mastoid();
+
+enum class PhantomRegion : int { head, temporal };
+template <>
+struct EnumNames<PhantomRegion> {
+  static constexpr std::array<std::string_view, 2> values{"head", "temporal"};
+};
+
+struct PhantomParams {
+  PhantomRegion region = PhantomRegion::head;
+  double spacing_mm = 1.0;
+  double slice_mm = 0;
+  double noise_hu = 15;
+  int seed = 1;
+};
+
+struct Phantom {
+  Image ct;            ///< mean HU over the voxel (27 samples where tissues meet), plus Gaussian noise
+  Labels labels;       ///< exact tissue at the voxel centre
+  double bone_mm3 = 0;  ///< by the same 27 samples a voxel
+};
+/// Same parameters, same bytes, for any number of threads.
+[[nodiscard]] Phantom make_phantom(const PhantomParams& params, const Context& context = {});
+
+struct PhantomStage {
+  using Params = PhantomParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"region", "the whole head, or a block around the left temporal bone"}, p.region);
+    visit({"spacing_mm", "voxel size in the slice", "mm", 0.2, 4}, p.spacing_mm);
+    visit({"slice_mm", "distance of slices (0: same as spacing_mm)", "mm", 0, 10}, p.slice_mm);
+    visit({"noise_hu", "standard deviation of the noise", "HU", 0, 200}, p.noise_hu);
+    visit({"seed", "of the noise", "", 0, 2147483647}, p.seed);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+}  // namespace osteo

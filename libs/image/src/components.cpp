@@ -1,0 +1,75 @@
+#include "osteo/image/components.h"
+
+#include <numeric>
+
+namespace osteo {
+
+Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
+                                Connectivity connectivity) {
+  const auto nx = static_cast<std::uint32_t>(dims[0]);
+  const auto ny = static_cast<std::uint32_t>(dims[1]);
+  const auto rows = ny * static_cast<std::uint32_t>(dims[2]);
+  Components result;
+  std::vector<std::uint32_t> first(rows + 1);
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    first[row] = static_cast<std::uint32_t>(result.runs.size());
+    const std::uint8_t* const p = mask.data() + static_cast<std::size_t>(row) * nx;
+    for (std::uint32_t x = 0; x < nx;) {
+      while (x < nx && p[x] != value) ++x;
+      if (x == nx) break;
+      const std::uint32_t begin = x;
+      while (x < nx && p[x] == value) ++x;
+      result.runs.push_back({begin, x, row});
+    }
+  }
+  first[rows] = static_cast<std::uint32_t>(result.runs.size());
+
+  std::vector<std::uint32_t> parent(result.runs.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  // Runs of two rows touch when they overlap; with 26 neighbours also when they meet corner to corner.
+  const std::uint32_t reach = connectivity == Connectivity::full ? 1 : 0;
+  const auto join_rows = [&](std::uint32_t a, std::uint32_t b) {
+    std::uint32_t i = first[a], j = first[b];
+    while (i < first[a + 1] && j < first[b + 1]) {
+      const Run &r = result.runs[i], &s = result.runs[j];
+      if (r.begin < s.end + reach && s.begin < r.end + reach) {
+        const std::uint32_t u = root(i), v = root(j);
+        if (u < v) parent[v] = u;
+        if (v < u) parent[u] = v;
+      }
+      if (r.end < s.end) {
+        ++i;
+      } else {
+        ++j;
+      }
+    }
+  };
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    const std::uint32_t y = row % ny, z = row / ny;
+    if (y > 0) join_rows(row, row - 1);
+    if (z == 0) continue;
+    join_rows(row, row - ny);
+    if (reach == 0) continue;
+    if (y > 0) join_rows(row, row - ny - 1);
+    if (y + 1 < ny) join_rows(row, row - ny + 1);
+  }
+
+  result.component.resize(result.runs.size());
+  for (std::uint32_t i = 0; i < result.runs.size(); ++i) {
+    const std::uint32_t r = root(i);
+    if (r == i) {
+      result.component[i] = static_cast<std::uint32_t>(result.voxels.size());
+      result.voxels.push_back(0);
+    } else {
+      result.component[i] = result.component[r];  // r < i: a root is the smallest index of its set
+    }
+    result.voxels[result.component[i]] += result.runs[i].end - result.runs[i].begin;
+  }
+  return result;
+}
+
+}  // namespace osteo

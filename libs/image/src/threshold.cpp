@@ -1,0 +1,124 @@
+#include "osteo/image/threshold.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
+#include "osteo/image/distance.h"
+
+namespace osteo {
+namespace {
+
+constexpr std::size_t kGrain = 1 << 16;
+
+void paint(std::uint8_t* mask, const Components& parts, int nx, std::uint8_t value, const std::vector<bool>& chosen) {
+  for (std::size_t r = 0; r < parts.runs.size(); ++r) {
+    if (!chosen[parts.component[r]]) continue;
+    const Run& run = parts.runs[r];
+    std::fill(mask + static_cast<std::size_t>(run.row) * static_cast<std::size_t>(nx) + run.begin,
+              mask + static_cast<std::size_t>(run.row) * static_cast<std::size_t>(nx) + run.end, value);
+  }
+}
+
+void keep_cored_pieces(std::uint8_t* mask, const Image& ct, double core, Connectivity connectivity) {
+  const auto parts = connected_components({mask, ct.frame.voxel_count()}, ct.frame.dims, 1, connectivity);
+  std::vector<bool> drop(parts.voxels.size(), true);
+  for (std::size_t r = 0; r < parts.runs.size(); ++r) {
+    const Run& run = parts.runs[r];
+    const std::int16_t* const row = ct.voxels.get() + static_cast<std::size_t>(run.row) * static_cast<std::size_t>(ct.frame.dims[0]);
+    if (std::any_of(row + run.begin, row + run.end, [&](std::int16_t hu) { return hu >= core; })) drop[parts.component[r]] = false;
+  }
+  paint(mask, parts, ct.frame.dims[0], 0, drop);
+}
+
+void close_gaps(std::uint8_t* mask, const Frame& frame, double radius_mm, const Context& context) {
+  const std::size_t n = frame.voxel_count();
+  const auto r2 = static_cast<float>(radius_mm * radius_mm);
+  const auto to_mask = squared_distance_mm2({mask, n}, frame, 1, context);
+  std::vector<std::uint8_t> dilated(n);
+  for (std::size_t i = 0; i < n; ++i) dilated[i] = to_mask[i] <= r2 ? 1 : 0;
+  const auto to_rest = squared_distance_mm2(dilated, frame, 0, context);
+  for (std::size_t i = 0; i < n; ++i) mask[i] = to_rest[i] > r2 ? 1 : mask[i];
+}
+
+void fill_cavities(std::uint8_t* mask, const Frame& frame, double max_mm3) {
+  const auto parts = connected_components({mask, frame.voxel_count()}, frame.dims, 0, Connectivity::face);
+  const auto nx = static_cast<std::uint32_t>(frame.dims[0]), ny = static_cast<std::uint32_t>(frame.dims[1]);
+  const auto nz = static_cast<std::uint32_t>(frame.dims[2]);
+  std::vector<bool> enclosed(parts.voxels.size());
+  for (std::size_t c = 0; c < enclosed.size(); ++c) {
+    enclosed[c] = static_cast<double>(parts.voxels[c]) * frame.voxel_volume_mm3() <= max_mm3;
+  }
+  for (std::size_t r = 0; r < parts.runs.size(); ++r) {
+    const Run& run = parts.runs[r];
+    const std::uint32_t y = run.row % ny, z = run.row / ny;
+    if (run.begin == 0 || run.end == nx || y == 0 || y + 1 == ny || z == 0 || z + 1 == nz) enclosed[parts.component[r]] = false;
+  }
+  paint(mask, parts, frame.dims[0], 1, enclosed);
+}
+
+void drop_small_pieces(std::uint8_t* mask, const Frame& frame, const ThresholdParams& p, const Context& context) {
+  const auto parts = connected_components({mask, frame.voxel_count()}, frame.dims, 1, p.connectivity);
+  std::vector<std::uint32_t> order(parts.voxels.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return parts.voxels[a] > parts.voxels[b]; });
+  std::vector<bool> drop(order.size(), true);
+  std::int64_t kept = 0;
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    const bool large = static_cast<double>(parts.voxels[order[rank]]) * frame.voxel_volume_mm3() >= p.min_volume_mm3;
+    const bool counted = p.keep_largest == 0 || rank < static_cast<std::size_t>(p.keep_largest);
+    drop[order[rank]] = !(large && counted);
+    kept += large && counted ? 1 : 0;
+  }
+  paint(mask, parts, frame.dims[0], 0, drop);
+  context.report("pieces_found", static_cast<std::int64_t>(parts.voxels.size()));
+  context.report("pieces_kept", kept);
+}
+
+}  // namespace
+
+Labels threshold(const Image& ct, const ThresholdParams& p, const Context& context) {
+  if (p.lower > p.upper) {
+    throw Error(ExitCode::usage, "--lower " + format_number(p.lower) + " HU is above --upper " + format_number(p.upper) + " HU");
+  }
+  const std::size_t n = ct.frame.voxel_count();
+  const auto mask = make_voxels<std::uint8_t>(n);
+  parallel_for(n, kGrain, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) mask[i] = ct.voxels[i] >= p.lower && ct.voxels[i] <= p.upper ? 1 : 0;
+  });
+  context.progress(0.2, "components");
+  if (p.core > p.lower) keep_cored_pieces(mask.get(), ct, p.core, p.connectivity);
+  if (p.close_mm > 0) close_gaps(mask.get(), ct.frame, p.close_mm, context);
+  context.progress(0.5, "components");
+  if (p.fill_mm3 > 0) fill_cavities(mask.get(), ct.frame, p.fill_mm3);
+  drop_small_pieces(mask.get(), ct.frame, p, context);
+  const auto count = static_cast<std::int64_t>(std::count(mask.get(), mask.get() + n, std::uint8_t{1}));
+  if (count == 0) {
+    throw Error(ExitCode::failed, "no voxel is left between " + format_number(p.lower) + " and " + format_number(p.upper) + " HU",
+                "'osteo info FILE' shows the range of values; lower --lower or --min-volume-mm3");
+  }
+  context.report("mask_voxels", count);
+  context.report("mask_volume_mm3", static_cast<double>(count) * ct.frame.voxel_volume_mm3());
+  context.progress(1.0);
+  return {ct.frame, mask};
+}
+
+StageInfo ThresholdStage::info() {
+  return {.name = "threshold",
+          .version = 1,
+          .synopsis = "bone mask from a CT by Hounsfield units",
+          .description =
+              "Marks the voxels between two HU values, then cleans the mask: hysteresis, closing, filling of cavities, and "
+              "removal of small pieces, each off unless asked for except the last.",
+          .inputs = {{"image", {DataKind::image}, "CT in HU"}},
+          .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1"},
+          .example = "osteo threshold ct.nrrd bone.nrrd --lower 250 --core 500"};
+}
+
+std::vector<Data> ThresholdStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  return {threshold(std::get<Image>(inputs[0]), params, context)};
+}
+
+}  // namespace osteo

@@ -1,0 +1,25 @@
+// CT volumes and label maps in the formats of the field: NRRD, NIfTI, MetaImage, VTI.
+#pragma once
+#include <filesystem>
+
+#include "osteo/base/context.h"
+#include "osteo/data/volume.h"
+
+namespace osteo {
+
+/// True for .nrrd .nhdr .nii .nii.gz .mha .mhd .vti (any case).
+[[nodiscard]] bool is_volume_file(const std::filesystem::path& path);
+
+/// By suffix. The frame comes out in LPS mm whatever the format's own axes are (NIfTI and some NRRD: RAS).
+/// NIfTI: sform when present, else qform; a sheared sform is refused. Errors: no_input, cannot_read, corrupt.
+[[nodiscard]] Image load_image(const std::filesystem::path& path, const Context& context = {});
+/// The same for values that are whole numbers from 0 to 255.
+[[nodiscard]] Labels load_labels(const std::filesystem::path& path, const Context& context = {});
+/// True when the file's scalars are 8-bit unsigned: then it is taken for labels where both are accepted.
+[[nodiscard]] bool holds_labels(const std::filesystem::path& path, const Context& context = {});
+
+/// By suffix, written atomically. Same volume, same bytes. Errors: usage for an unknown suffix, cannot_write.
+void save_image(const Image& image, const std::filesystem::path& path);
+void save_labels(const Labels& labels, const std::filesystem::path& path);
+
+}  // namespace osteo

@@ -1,0 +1,41 @@
+// Our values as VTK data sets and back. Voxels are shared, not copied; whoever lives longer keeps them alive.
+#pragma once
+#include <vtkSmartPointer.h>
+
+#include "osteo/data/tri_mesh.h"
+#include "osteo/data/volume.h"
+
+class vtkImageData;
+class vtkPolyData;
+
+namespace osteo {
+
+/// Zero-copy. Origin, spacing and direction carry the frame (LPS mm).
+[[nodiscard]] vtkSmartPointer<vtkImageData> to_vtk(const Image& image);
+[[nodiscard]] vtkSmartPointer<vtkImageData> to_vtk(const Labels& labels);
+/// Copies points and triangles.
+[[nodiscard]] vtkSmartPointer<vtkPolyData> to_vtk(const TriMesh& mesh);
+
+/// Zero-copy where the scalars are already of the right type, else converted as load_image / load_labels do.
+/// Errors: corrupt when there are no scalars, several components, or values that do not fit.
+[[nodiscard]] Image image_from_vtk(vtkImageData* data);
+[[nodiscard]] Labels labels_from_vtk(vtkImageData* data);
+/// Polygons of more than three points are refused (Error corrupt); strips and lines are ignored.
+[[nodiscard]] TriMesh mesh_from_vtk(vtkPolyData* data);
+
+/// While it lives, VTK's warnings and errors are collected instead of printed.
+class QuietVtk {
+ public:
+  QuietVtk();
+  ~QuietVtk();
+  QuietVtk(const QuietVtk&) = delete;
+  QuietVtk& operator=(const QuietVtk&) = delete;
+  /// The first message since construction, without VTK's file and line; empty when there was none.
+  [[nodiscard]] std::string first_message() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteo

@@ -1,0 +1,95 @@
+#include "raw_volume.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/base/error.h"
+#include "osteo/base/param.h"
+#include "osteo/base/parallel.h"
+
+namespace osteo::io {
+namespace {
+
+template <class F>
+void visit_scalars(const RawVolume& raw, F&& f) {
+  const void* const p = raw.data.get();
+  switch (raw.type) {
+    case Scalar::u8: f(static_cast<const std::uint8_t*>(p)); break;
+    case Scalar::i8: f(static_cast<const std::int8_t*>(p)); break;
+    case Scalar::u16: f(static_cast<const std::uint16_t*>(p)); break;
+    case Scalar::i16: f(static_cast<const std::int16_t*>(p)); break;
+    case Scalar::u32: f(static_cast<const std::uint32_t*>(p)); break;
+    case Scalar::i32: f(static_cast<const std::int32_t*>(p)); break;
+    case Scalar::f32: f(static_cast<const float*>(p)); break;
+    case Scalar::f64: f(static_cast<const double*>(p)); break;
+  }
+}
+
+}  // namespace
+
+std::size_t size_of(Scalar type) {
+  switch (type) {
+    case Scalar::u8:
+    case Scalar::i8: return 1;
+    case Scalar::u16:
+    case Scalar::i16: return 2;
+    case Scalar::u32:
+    case Scalar::i32:
+    case Scalar::f32: return 4;
+    case Scalar::f64: return 8;
+  }
+  return 0;
+}
+
+Image image_from(const RawVolume& raw, const Context& context) {
+  require_valid(raw.frame);
+  const std::size_t n = raw.frame.voxel_count();
+  if (raw.type == Scalar::i16) {
+    auto shared = std::static_pointer_cast<const std::int16_t>(raw.data);
+    return {raw.frame, std::shared_ptr<const std::int16_t[]>(shared, shared.get())};
+  }
+  const auto out = make_voxels<std::int16_t>(n);
+  double lo = 1e300, hi = -1e300;
+  std::size_t clipped = 0;
+  visit_scalars(raw, [&](const auto* p) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const double v = static_cast<double>(p[i]);
+      if (!std::isfinite(v)) {
+        throw Error(ExitCode::corrupt, "voxel " + std::to_string(i) + " is not a finite number");
+      }
+      lo = std::min(lo, v);
+      hi = std::max(hi, v);
+      clipped += v < -32768 || v > 32767 ? 1 : 0;
+      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(v + 0.5), -32768.0, 32767.0));
+    }
+  });
+  if (hi - lo < 16) {
+    throw Error(ExitCode::corrupt, "the values run only from " + format_number(lo) + " to " + format_number(hi) + ": this is not CT in HU",
+                "rescale the image to Hounsfield units, or load it as labels");
+  }
+  if (clipped > 0) context.warn(std::to_string(clipped) + " voxels beyond the range of 16 bits were clipped");
+  return {raw.frame, out};
+}
+
+Labels labels_from(const RawVolume& raw) {
+  require_valid(raw.frame);
+  const std::size_t n = raw.frame.voxel_count();
+  if (raw.type == Scalar::u8) {
+    auto shared = std::static_pointer_cast<const std::uint8_t>(raw.data);
+    return {raw.frame, std::shared_ptr<const std::uint8_t[]>(shared, shared.get())};
+  }
+  const auto out = make_voxels<std::uint8_t>(n);
+  visit_scalars(raw, [&](const auto* p) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const double v = static_cast<double>(p[i]);
+      if (!(v >= 0 && v <= 255 && v == std::floor(v))) {
+        throw Error(ExitCode::corrupt, "the value " + format_number(v) + " is not a label from 0 to 255",
+                    "this looks like a CT, not like a mask or label map");
+      }
+      out[i] = static_cast<std::uint8_t>(v);
+    }
+  });
+  return {raw.frame, out};
+}
+
+}  // namespace osteo::io

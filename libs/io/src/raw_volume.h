@@ -1,0 +1,38 @@
+// A volume as a file holds it: any scalar type. Private to libs/io.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "osteo/base/context.h"
+#include "osteo/data/volume.h"
+
+namespace osteo::io {
+
+enum class Scalar { u8, i8, u16, i16, u32, i32, f32, f64 };
+[[nodiscard]] std::size_t size_of(Scalar type);
+
+struct RawVolume {
+  Frame frame;
+  Scalar type = Scalar::i16;
+  std::shared_ptr<const void> data;  ///< frame.voxel_count() scalars in machine byte order, x fastest
+};
+
+/// Values are rounded to whole HU. Error(corrupt) when they are not finite, or too small in range to be HU.
+[[nodiscard]] Image image_from(const RawVolume& raw, const Context& context);
+/// Error(corrupt) when a value is not a whole number from 0 to 255.
+[[nodiscard]] Labels labels_from(const RawVolume& raw);
+
+[[nodiscard]] RawVolume read_nrrd(const std::filesystem::path& path);
+[[nodiscard]] RawVolume read_nifti(const std::filesystem::path& path, const Context& context);
+[[nodiscard]] RawVolume read_meta(const std::filesystem::path& path);
+[[nodiscard]] RawVolume read_vti(const std::filesystem::path& path);
+
+void write_nrrd(const RawVolume& raw, const std::filesystem::path& path);
+void write_nifti(const RawVolume& raw, const std::filesystem::path& path);
+void write_meta(const RawVolume& raw, const std::filesystem::path& path);
+void write_vti(const RawVolume& raw, const std::filesystem::path& path);
+
+}  // namespace osteo::io

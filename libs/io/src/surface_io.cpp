@@ -1,0 +1,144 @@
+#include "osteo/io/surface_io.h"
+
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkOBJReader.h>
+#include <vtkOBJWriter.h>
+#include <vtkPLYReader.h>
+#include <vtkPLYWriter.h>
+#include <vtkPNGReader.h>
+#include <vtkPNGWriter.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkSTLReader.h>
+#include <vtkSTLWriter.h>
+#include <vtkXMLPolyDataReader.h>
+#include <vtkXMLPolyDataWriter.h>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/io/vtk_data.h"
+
+namespace osteo {
+namespace {
+
+constexpr const char* kHeader = "Osteotome; LPS; mm";
+
+template <class Reader>
+vtkSmartPointer<vtkPolyData> read_with(const fs::path& path) {
+  const QuietVtk quiet;
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  if (reader->GetErrorCode() != 0 || !quiet.first_message().empty()) {
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read: " + quiet.first_message());
+  }
+  return reader->GetOutput();
+}
+
+template <class Writer>
+void write_with(Writer* writer, vtkPolyData* data, const fs::path& path) {
+  write_atomically(path, [&](const fs::path& temporary) {
+    const QuietVtk quiet;
+    writer->SetFileName(temporary.c_str());
+    writer->SetInputData(data);
+    if (writer->Write() == 0 || writer->GetErrorCode() != 0) {
+      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + quiet.first_message(), "see that the disk has room");
+    }
+  });
+}
+
+}  // namespace
+
+bool is_surface_file(const fs::path& path) {
+  const auto e = path.extension();
+  return e == ".ply" || e == ".stl" || e == ".obj" || e == ".vtp";
+}
+
+Surface load_surface(const fs::path& path) {
+  require_readable(path);
+  const auto e = path.extension();
+  vtkSmartPointer<vtkPolyData> poly;
+  if (e == ".ply") poly = read_with<vtkPLYReader>(path);
+  if (e == ".stl") poly = read_with<vtkSTLReader>(path);
+  if (e == ".obj") poly = read_with<vtkOBJReader>(path);
+  if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
+  if (!poly) throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");
+  try {
+    auto mesh = std::make_shared<TriMesh>(mesh_from_vtk(poly));
+    if (mesh->triangles.empty()) throw Error(ExitCode::corrupt, "it holds no triangles");
+    return mesh;
+  } catch (const Error& error) {
+    throw error.in("'" + path.string() + "'");
+  }
+}
+
+void save_surface(const TriMesh& mesh, const fs::path& path) {
+  const auto poly = to_vtk(mesh);
+  const auto e = path.extension();
+  if (e == ".ply") {
+    vtkNew<vtkPLYWriter> writer;
+    writer->SetFileTypeToBinary();
+    writer->AddComment(kHeader);
+    write_with(writer.Get(), poly, path);
+  } else if (e == ".stl") {
+    vtkNew<vtkSTLWriter> writer;
+    writer->SetFileTypeToBinary();
+    writer->SetHeader(kHeader);
+    write_with(writer.Get(), poly, path);
+  } else if (e == ".obj") {
+    vtkNew<vtkOBJWriter> writer;
+    write_with(writer.Get(), poly, path);
+  } else if (e == ".vtp") {
+    vtkNew<vtkXMLPolyDataWriter> writer;
+    write_with(writer.Get(), poly, path);
+  } else {
+    throw Error(ExitCode::usage, "cannot write a surface as '" + path.filename().string() + "'", "name it .ply, .stl, .obj or .vtp");
+  }
+}
+
+void save_picture(const Picture& picture, const fs::path& path) {
+  if (path.extension() != ".png") {
+    throw Error(ExitCode::usage, "cannot write a picture as '" + path.filename().string() + "'", "name it .png");
+  }
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(picture.width, picture.height, 1);
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  const std::size_t row = static_cast<std::size_t>(picture.width) * 3;
+  for (int y = 0; y < picture.height; ++y) {
+    std::copy_n(picture.rgb.data() + static_cast<std::size_t>(picture.height - 1 - y) * row, row,
+                static_cast<unsigned char*>(image->GetScalarPointer(0, y, 0)));
+  }
+  write_atomically(path, [&](const fs::path& temporary) {
+    const QuietVtk quiet;
+    vtkNew<vtkPNGWriter> writer;
+    writer->SetFileName(temporary.c_str());
+    writer->SetInputData(image);
+    writer->Write();
+    if (writer->GetErrorCode() != 0) {
+      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "'", "see that the disk has room");
+    }
+  });
+}
+
+Picture load_picture(const fs::path& path) {
+  require_readable(path);
+  const QuietVtk quiet;
+  vtkNew<vtkPNGReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  vtkImageData* const image = reader->GetOutput();
+  if (reader->GetErrorCode() != 0 || image->GetNumberOfScalarComponents() < 3) {
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' is not an RGB picture (.png)");
+  }
+  Picture picture{image->GetDimensions()[0], image->GetDimensions()[1], {}};
+  for (int y = picture.height - 1; y >= 0; --y) {
+    for (int x = 0; x < picture.width; ++x) {
+      const auto* const p = static_cast<const unsigned char*>(image->GetScalarPointer(x, y, 0));
+      picture.rgb.insert(picture.rgb.end(), p, p + 3);
+    }
+  }
+  return picture;
+}
+
+}  // namespace osteo

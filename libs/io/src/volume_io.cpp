@@ -1,0 +1,80 @@
+#include "osteo/io/volume_io.h"
+
+#include <algorithm>
+#include <array>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "raw_volume.h"
+
+namespace osteo {
+namespace {
+
+struct Format {
+  std::string_view suffix;
+  io::RawVolume (*read)(const fs::path&, const Context&);
+  void (*write)(const io::RawVolume&, const fs::path&);
+};
+
+constexpr std::array<Format, 7> kFormats{{
+    {".nrrd", [](const fs::path& p, const Context&) { return io::read_nrrd(p); }, io::write_nrrd},
+    {".nhdr", [](const fs::path& p, const Context&) { return io::read_nrrd(p); }, nullptr},
+    {".nii", io::read_nifti, io::write_nifti},
+    {".nii.gz", io::read_nifti, io::write_nifti},
+    {".mha", [](const fs::path& p, const Context&) { return io::read_meta(p); }, io::write_meta},
+    {".mhd", [](const fs::path& p, const Context&) { return io::read_meta(p); }, nullptr},
+    {".vti", [](const fs::path& p, const Context&) { return io::read_vti(p); }, io::write_vti},
+}};
+
+const Format* format_of(const fs::path& path) {
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const Format& f : kFormats) {
+    if (name.size() > f.suffix.size() && name.ends_with(f.suffix)) return &f;
+  }
+  return nullptr;
+}
+
+io::RawVolume load_raw(const fs::path& path, const Context& context) {
+  require_readable(path);
+  const Format* const format = format_of(path);
+  if (format == nullptr) {
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a volume file by its name",
+                "volumes are .nrrd, .nii, .nii.gz, .mha, .mhd, .vti, or a folder of DICOM files through 'import'");
+  }
+  return format->read(path, context);
+}
+
+template <class T>
+void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path) {
+  const Format* const format = format_of(path);
+  if (format == nullptr || format->write == nullptr) {
+    throw Error(ExitCode::usage, "cannot write a volume as '" + path.filename().string() + "'", "name it .nrrd, .nii.gz, .mha or .vti");
+  }
+  format->write({volume.frame, type, std::shared_ptr<const void>(volume.voxels, volume.voxels.get())}, path);
+}
+
+}  // namespace
+
+bool is_volume_file(const fs::path& path) { return format_of(path) != nullptr; }
+Image load_image(const fs::path& path, const Context& context) {
+  const auto raw = load_raw(path, context);
+  try {
+    return io::image_from(raw, context);
+  } catch (const Error& e) {
+    throw e.in("'" + path.string() + "'");
+  }
+}
+Labels load_labels(const fs::path& path, const Context& context) {
+  const auto raw = load_raw(path, context);
+  try {
+    return io::labels_from(raw);
+  } catch (const Error& e) {
+    throw e.in("'" + path.string() + "'");
+  }
+}
+bool holds_labels(const fs::path& path, const Context& context) { return load_raw(path, context).type == io::Scalar::u8; }
+void save_image(const Image& image, const fs::path& path) { save_volume(image, io::Scalar::i16, path); }
+void save_labels(const Labels& labels, const fs::path& path) { save_volume(labels, io::Scalar::u8, path); }
+
+}  // namespace osteo

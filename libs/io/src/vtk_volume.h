@@ -1,0 +1,17 @@
+// vtkImageData to RawVolume and back. Private to libs/io.
+#pragma once
+#include <vtkSmartPointer.h>
+
+#include "raw_volume.h"
+
+class vtkImageData;
+
+namespace osteo::io {
+
+void set_frame(vtkImageData* image, const Frame& frame);
+/// Shares the scalars.
+[[nodiscard]] RawVolume raw_from_vtk(vtkImageData* image);
+/// Shares the scalars for the time of the call: the result must not outlive `raw`.
+[[nodiscard]] vtkSmartPointer<vtkImageData> vtk_view(const RawVolume& raw);
+
+}  // namespace osteo::io

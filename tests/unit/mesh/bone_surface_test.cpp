@@ -1,0 +1,146 @@
+#include "osteo/mesh/bone_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace osteo {
+namespace {
+
+// A grid of n^3 bricks from f(i, j, k), stored at brick (1,1,1) on so that the surface never leaves positive indices.
+template <class F>
+BrickGrid make_grid(int n, F&& f) {
+  std::vector<Ijk> bricks;
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) bricks.push_back({i, j, k});
+    }
+  }
+  Frame frame;
+  frame.dims = {8 * n, 8 * n, 8 * n};
+  BrickGrid grid(frame, bricks);
+  for (int k = 0; k < 8 * n; ++k) {
+    for (int j = 0; j < 8 * n; ++j) {
+      for (int i = 0; i < 8 * n; ++i) grid.set(grid.find(i, j, k), static_cast<float>(f(i, j, k)));
+    }
+  }
+  return grid;
+}
+
+void expect_closed_manifold(const TriMesh& mesh) {
+  const MeshCheck c = check(mesh);
+  EXPECT_EQ(c.open_edges, 0u);
+  EXPECT_EQ(c.nonmanifold_edges, 0u);
+  EXPECT_EQ(c.misoriented_edges, 0u);
+  EXPECT_EQ(c.nonmanifold_points, 0u);
+  EXPECT_EQ(c.degenerate, 0u);
+}
+
+TEST(SurfaceNets, SphereLiesOnTheExactBoundary) {
+  const double r = 13.3;
+  const auto grid = make_grid(4, [&](int i, int j, int k) {
+    return std::clamp(0.5 + r - std::sqrt((i - 15.6) * (i - 15.6) + (j - 16.1) * (j - 16.1) + (k - 15.9) * (k - 15.9)), 0.0, 1.0);
+  });
+  const auto surface = surface_nets(grid);
+  expect_closed_manifold(surface.mesh);
+  double worst = 0, mean = 0;
+  for (std::size_t v = 0; v < surface.mesh.points_mm.size(); ++v) {
+    const auto& p = surface.mesh.points_mm[v];
+    const Vec3 d{p[0] - 15.6, p[1] - 16.1, p[2] - 15.9};
+    worst = std::max(worst, std::abs(length(d) - r));
+    const auto& n = surface.mesh.normals[v];
+    EXPECT_GT(dot(normalized(d), {n[0], n[1], n[2]}), 0.95);
+    mean += std::abs(length(d) - r) / static_cast<double>(surface.mesh.points_mm.size());
+  }
+  EXPECT_LT(mean, 0.04);  // voxels
+  EXPECT_LT(worst, 0.12);
+  EXPECT_NEAR(enclosed_volume_mm3(surface.mesh), 4.0 / 3 * M_PI * r * r * r, 0.01 * 4.0 / 3 * M_PI * r * r * r);
+}
+
+// Every way to fill a 3x3x3 block would be 2^27; random fillings at many densities meet all local configurations.
+TEST(SurfaceNets, ClosedManifoldForRandomVoxels) {
+  std::mt19937 random(7);
+  for (int trial = 0; trial < 60; ++trial) {
+    const double share = 0.05 + 0.9 * trial / 59;
+    std::bernoulli_distribution bone(share);
+    std::uniform_real_distribution<float> value(0.0F, 0.49F);
+    const auto grid = make_grid(2, [&](int, int, int) { return bone(random) ? 0.51F + value(random) : value(random); });
+    const auto surface = surface_nets(grid);
+    SCOPED_TRACE(share);
+    expect_closed_manifold(surface.mesh);
+    if (HasFailure()) return;
+  }
+}
+
+TEST(SurfaceNets, PatchesAfterEditsEqualRebuild) {
+  std::mt19937 random(11);
+  auto grid = make_grid(3, [&](int, int, int) { return 1.0F; });
+  std::vector<SurfacePatch> patches(grid.brick_count());
+  for (std::uint32_t b = 0; b < patches.size(); ++b) patches[b] = extract_patch(grid, b);
+  std::uniform_int_distribution<int> at(0, 23);
+  std::uniform_real_distribution<float> value(0.0F, 1.0F);
+  for (int edit = 0; edit < 3000; ++edit) {
+    const int i = at(random), j = at(random), k = at(random);
+    grid.set(grid.find(i, j, k), value(random));
+    for (int n = 0; n < 27; ++n) {
+      const auto b = grid.find_brick((i + (n % 3 - 1) * 2) >> 3, (j + (n / 3 % 3 - 1) * 2) >> 3, (k + (n / 9 - 1) * 2) >> 3);
+      if (b != BrickGrid::kNone) patches[b] = extract_patch(grid, b);
+    }
+  }
+  const auto local = join_patches(grid, patches), rebuilt = surface_nets(grid);
+  EXPECT_EQ(local.mesh.points_mm, rebuilt.mesh.points_mm);
+  EXPECT_EQ(local.mesh.normals, rebuilt.mesh.normals);
+  EXPECT_EQ(local.mesh.triangles, rebuilt.mesh.triangles);
+  EXPECT_EQ(local.voxels, rebuilt.voxels);
+  expect_closed_manifold(local.mesh);
+}
+
+TEST(SurfaceNets, SameForAnyThreadCount) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> value(0.0F, 1.0F);
+  const auto grid = make_grid(5, [&](int, int, int) { return value(random); });
+  Context one, two;
+  one.threads = 1;
+  two.threads = 2;
+  EXPECT_EQ(surface_nets(grid, 0.5F, one).mesh.triangles, surface_nets(grid, 0.5F, two).mesh.triangles);
+}
+
+TEST(SurfaceNets, MapsTieVoxelsToTheirTriangles) {
+  const auto grid = make_grid(2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
+  const auto s = surface_nets(grid);
+  EXPECT_EQ(s.voxels.size(), 8u * 8 * 8 - 6 * 6 * 6);  // the cube's outer layer
+  EXPECT_EQ(s.triangles_of_vertex.items.size(), s.mesh.triangles.size() * 3);
+  for (std::size_t r = 0; r < s.voxels.size(); ++r) {
+    const Ijk c = grid.coordinate(s.voxels[r]);
+    for (const auto v : s.vertices_of_voxel.row(r)) {
+      const auto& p = s.mesh.points_mm[v];
+      EXPECT_LE(std::max({std::abs(p[0] - c.i), std::abs(p[1] - c.j), std::abs(p[2] - c.k)}), 1.0F);
+    }
+  }
+}
+
+TEST(VoxelSurface, CubeHasOneTriangleForEachHalfSquare) {
+  const auto grid = make_grid(2, [](int i, int j, int k) { return i > 3 && i < 12 && j > 3 && j < 12 && k > 3 && k < 12 ? 1.0F : 0.0F; });
+  const auto s = voxel_surface(grid);
+  EXPECT_EQ(s.voxels.size(), 8u * 8 * 8 - 6 * 6 * 6);
+  EXPECT_EQ(s.mesh.triangles.size(), 6u * 7 * 7 * 2);
+  expect_closed_manifold(s.mesh);
+  EXPECT_NEAR(enclosed_volume_mm3(s.mesh), 7.0 * 7 * 7, 1e-3);
+}
+
+TEST(VoxelSurface, BallIsClosedAndEachVertexIsAVoxel) {
+  const auto grid = make_grid(4, [](int i, int j, int k) { return (i - 16) * (i - 16) + (j - 16) * (j - 16) + (k - 15) * (k - 15) < 130 ? 1.0F : 0.0F; });
+  const auto s = voxel_surface(grid);
+  const MeshCheck c = check(s.mesh);
+  EXPECT_EQ(c.open_edges, 0u);
+  EXPECT_EQ(c.degenerate, 0u);
+  ASSERT_EQ(s.voxels.size(), s.mesh.points_mm.size());
+  for (std::size_t v = 0; v < s.voxels.size(); ++v) {
+    const Ijk at = grid.coordinate(s.voxels[v]);
+    EXPECT_EQ(s.mesh.points_mm[v], (std::array<float, 3>{float(at.i), float(at.j), float(at.k)}));
+  }
+  EXPECT_GT(enclosed_volume_mm3(s.mesh), 0);
+}
+
+}  // namespace
+}  // namespace osteo
