@@ -6,6 +6,7 @@
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationObjectBaseKey.h>
+#include <vtkLogger.h>
 #include <vtkMatrix3x3.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
@@ -137,10 +138,14 @@ struct QuietVtk::Impl {
 };
 
 QuietVtk::QuietVtk() : impl_(std::make_unique<Impl>()) {
+  vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
   impl_->before = vtkOutputWindow::GetInstance();
   vtkOutputWindow::SetInstance(impl_->collector);
 }
-QuietVtk::~QuietVtk() { vtkOutputWindow::SetInstance(impl_->before); }
+QuietVtk::~QuietVtk() {
+  vtkOutputWindow::SetInstance(impl_->before);
+  vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_WARNING);
+}
 
 std::string QuietVtk::first_message() const {
   const std::lock_guard lock(impl_->collector->mutex);

@@ -1,0 +1,162 @@
+// list, info, series: what there is.
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/grid/brick_grid.h"
+#include "osteo/io/dicom.h"
+#include "osteo/pipeline/formats.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json triple(Vec3 v) { return {v.x, v.y, v.z}; }
+
+void add_frame(ordered_json& j, const Frame& f) {
+  j["dims"] = f.dims;
+  j["spacing_mm"] = triple(f.spacing_mm);
+  j["origin_mm"] = triple(f.origin_mm);
+  j["axes"] = orientation_code(f);
+  j["direction"] = {triple(f.direction.column[0]), triple(f.direction.column[1]), triple(f.direction.column[2])};
+}
+
+ordered_json describe_data(const Data& data) {
+  ordered_json j;
+  j["kind"] = kind_name(kind_of(data));
+  if (const auto* image = std::get_if<Image>(&data)) {
+    add_frame(j, image->frame);
+    const auto [lo, hi] = std::minmax_element(image->span().begin(), image->span().end());
+    j["hu_range"] = {*lo, *hi};
+  } else if (const auto* labels = std::get_if<Labels>(&data)) {
+    add_frame(j, labels->frame);
+    std::array<std::uint64_t, 256> count{};
+    for (const auto v : labels->span()) ++count[v];
+    for (std::size_t v = 1; v < count.size(); ++v) {
+      if (count[v] > 0) j["volume_mm3"][std::to_string(v)] = static_cast<double>(count[v]) * labels->frame.voxel_volume_mm3();
+    }
+  } else if (const auto* grid = std::get_if<SparseGrid>(&data)) {
+    j["name"] = grid->name;
+    add_frame(j, grid->frame);
+    j["stored_voxels"] = grid->active_voxels;
+    j["memory_mb"] = static_cast<double>(grid->memory_bytes) / 1e6;
+    if (grid->name == "density") {
+      const BrickGrid bricks = to_bricks(*grid);
+      j["volume_mm3"] = bricks.sum() * grid->frame.voxel_volume_mm3();
+    }
+  } else if (const auto* surface = std::get_if<Surface>(&data)) {
+    const TriMesh& mesh = **surface;
+    j["points"] = mesh.points_mm.size();
+    j["triangles"] = mesh.triangles.size();
+    const MeshCheck c = check(mesh);
+    j["watertight"] = c.watertight();
+    j["manifold"] = c.manifold();
+    j["area_mm2"] = area_mm2(mesh);
+    if (c.watertight()) j["volume_mm3"] = enclosed_volume_mm3(mesh);
+    Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+    for (const auto& p : mesh.points_mm) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], static_cast<double>(p[a]));
+        hi[a] = std::max(hi[a], static_cast<double>(p[a]));
+      }
+    }
+    j["bounds_mm"] = {triple(lo), triple(hi)};
+  } else if (const auto* picture = std::get_if<Picture>(&data)) {
+    j["width"] = picture->width;
+    j["height"] = picture->height;
+  }
+  return j;
+}
+
+// JSON as indented lines for people.
+void print_plain(std::ostream& out, const ordered_json& j, const std::string& indent = "") {
+  for (const auto& [key, value] : j.items()) {
+    if (value.is_object()) {
+      out << indent << key << ":\n";
+      print_plain(out, value, indent + "  ");
+    } else {
+      out << indent << key << ": " << (value.is_string() ? value.get<std::string>() : value.dump()) << '\n';
+    }
+  }
+}
+
+}  // namespace
+
+cli::CommandInfo ListCommand::info() { return {"list", "the stages with their inputs and outputs", "One line a stage, or with --json their whole declarations.", {}, "osteo list"}; }
+
+int ListCommand::run(const Params&, cli::Invocation& io) {
+  ordered_json all = ordered_json::array();
+  for (const auto& name : io.registry.names()) {
+    const auto stage = io.registry.make(name);
+    std::string in, out;
+    for (const Port& p : stage->info().inputs) in += (in.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
+    for (const Port& p : stage->info().outputs) out += (out.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
+    if (io.common.json) {
+      all.push_back({{"name", name}, {"version", stage->info().version}, {"synopsis", stage->info().synopsis}});
+    } else {
+      io.out << name << std::string(12 - std::min<std::size_t>(11, name.size()), ' ') << (in.empty() ? "-" : in) << " -> " << out << "\n            " << stage->info().synopsis << '\n';
+    }
+  }
+  if (io.common.json) io.out << all.dump(2) << '\n';
+  return 0;
+}
+
+cli::CommandInfo InfoCommand::info() {
+  return {"info", "facts on any file that can be read", "Kind, frame, range of values, volume, closedness: whatever applies. A folder is taken for DICOM.", {{"file", "volume, grid, surface, picture, or DICOM folder"}}, "osteo info bone.vdb"};
+}
+
+int InfoCommand::run(const Params&, cli::Invocation& io) {
+  const fs::path path = io.arguments[0];
+  require_readable(path);
+  if (fs::is_directory(path) && !fs::exists(path / "manifest.json")) return SeriesCommand::run({}, io);
+  ordered_json j;
+  if (fs::is_directory(path)) {
+    j = ordered_json::parse(read_text(path / "manifest.json"));
+  } else {
+    static constexpr std::array kAny{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::picture};
+    j["file"] = path.string();
+    j.update(describe_data(load_data(path, kAny, io.context)));
+  }
+  io.end_progress();
+  if (io.common.json) {
+    io.out << j.dump(2) << '\n';
+  } else {
+    print_plain(io.out, j);
+  }
+  return 0;
+}
+
+cli::CommandInfo SeriesCommand::info() {
+  return {"series", "the DICOM series of a folder and what each is", "Also as 'osteo import --list'. The one marked * is taken when none is asked for.", {{"folder", "folder with DICOM files at any depth"}}, "osteo series DICOM_FOLDER"};
+}
+
+int SeriesCommand::run(const Params&, cli::Invocation& io) {
+  if (io.arguments.size() != 1) throw Error(ExitCode::usage, "which folder? osteo import --list FOLDER");
+  const auto all = scan_dicom(io.arguments[0], io.context);
+  io.end_progress();
+  if (io.common.json) {
+    ordered_json list = ordered_json::array();
+    for (const DicomSeries& s : all) {
+      list.push_back({{"number", s.number}, {"uid", s.uid}, {"modality", s.modality}, {"what", s.what}, {"usable", s.usable}, {"recommended", s.recommended}, {"images", s.images},
+                      {"columns", s.columns}, {"rows", s.rows}, {"pixel_mm", s.pixel_mm}, {"thickness_mm", s.thickness_mm}, {"kernel", s.kernel}, {"description", s.description}});
+    }
+    io.out << list.dump(2) << '\n';
+    return 0;
+  }
+  io.out << "  series  images  size       pixel mm  slice mm  what               kernel    description\n";
+  for (const DicomSeries& s : all) {
+    char line[256];
+    const std::string size = std::to_string(s.columns) + "x" + std::to_string(s.rows);
+    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-18s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images, size.c_str(), s.pixel_mm,
+                  s.thickness_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
+    io.out << line;
+  }
+  return 0;
+}
+
+}  // namespace osteo

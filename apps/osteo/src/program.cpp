@@ -1,0 +1,35 @@
+#include "commands.h"
+#include "osteo/grid/resample.h"
+#include "osteo/image/phantom.h"
+#include "osteo/image/threshold.h"
+#include "osteo/io/import.h"
+#include "osteo/mesh/bone_surface.h"
+#include "osteo/view/snapshot.h"
+
+namespace osteo {
+
+cli::Program& osteo_program() {
+  static cli::Program program = [] {
+    cli::Program p;
+    p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
+    p.licence =
+        "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, OpenVDB, oneTBB and zlib (all permissive or MPL-2.0);\n"
+        "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
+        "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
+    p.registry.add<ImportStage>();
+    p.registry.add<ThresholdStage>();
+    p.registry.add<ResampleStage>();
+    p.registry.add<SurfaceStage>();
+    p.registry.add<SnapshotStage>();
+    p.registry.add<PhantomStage>();
+    p.add<ListCommand>();
+    p.add<InfoCommand>();
+    p.add<SeriesCommand>();
+    p.add<RunCommand>();
+    p.add<DocsCommand>();
+    return p;
+  }();
+  return program;
+}
+
+}  // namespace osteo

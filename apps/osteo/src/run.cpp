@@ -1,0 +1,82 @@
+// run and docs.
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/cli/report.h"
+#include "osteo/pipeline/pipeline.h"
+
+namespace osteo {
+
+cli::CommandInfo RunCommand::info() {
+  return {"run", "run a pipeline file", "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set ID.PARAMETER=VALUE. The whole graph is checked before anything is read.",
+          {{"pipeline", "a .json file"}}, "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE"};
+}
+
+int RunCommand::run(const Params& p, cli::Invocation& io) {
+  const std::string text = read_text(io.arguments[0]);
+  std::map<std::string, std::string> settings(io.settings.begin(), io.settings.end());
+  if (p.validate) {
+    // Variables without value get a stand-in: the graph can be checked without them.
+    try {
+      for (const auto& v : pipeline_variables(text)) {
+        if (!v.fallback) settings.try_emplace(v.name, "VALUE");
+      }
+      Pipeline pipeline = parse_pipeline(text, settings);
+      validate(pipeline, io.registry);
+      nlohmann::ordered_json answer{{"valid", true}, {"stages", nlohmann::ordered_json::array()}};
+      for (const auto& n : pipeline.nodes) answer["stages"].push_back({{"id", n.id}, {"stage", n.stage}});
+      io.out << answer.dump(2) << '\n';
+      return 0;
+    } catch (const Error& e) {
+      io.out << nlohmann::ordered_json{{"valid", false}, {"error", e.what()}, {"advice", e.advice()}}.dump(2) << '\n';
+      return static_cast<int>(e.code());
+    }
+  }
+  Pipeline pipeline = parse_pipeline(text, settings);
+  if (p.dry_run) {
+    validate(pipeline, io.registry);
+    for (const auto& n : pipeline.nodes) {
+      io.out << n.id << " (" << n.stage << ")\n";
+      for (const auto& [port, in] : n.inputs) io.out << "  " << port << " <- " << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
+      for (const auto& [name, value] : n.params) io.out << "  " << name << " = " << value << '\n';
+      for (const auto& [port, path] : n.outputs) io.out << "  " << port << " -> " << path.string() << (fs::exists(path) ? " (exists)" : "") << '\n';
+    }
+    return 0;
+  }
+  const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = p.reuse}, io.context);
+  io.end_progress();
+  cli::print_results(results, io);
+  return 0;
+}
+
+cli::CommandInfo DocsCommand::info() {
+  return {"docs", "write the reference pages, the schema and the completion", "All of them are made from the declarations of the stages and commands.", {{"folder", "usually docs/reference"}}, "osteo docs docs/reference"};
+}
+
+int DocsCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path folder = io.arguments[0];
+  int stale = 0;
+  const auto pages = cli::reference_pages(osteo_program());
+  for (const auto& [name, content] : pages) {
+    const fs::path path = folder / name;
+    if (!p.check) {
+      fs::create_directories(folder);
+      write_file(path, content);
+    } else if (!fs::exists(path) || read_text(path) != content) {
+      io.err << "stale: " << path.string() << '\n';
+      ++stale;
+    }
+  }
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (pages.contains(entry.path().filename().string())) continue;
+    io.err << "stale: " << entry.path().string() << " belongs to nothing\n";
+    ++stale;
+  }
+  if (p.check && stale > 0) throw Error(ExitCode::failed, std::to_string(stale) + " reference pages are stale", "run: osteo docs " + folder.string());
+  return 0;
+}
+
+}  // namespace osteo

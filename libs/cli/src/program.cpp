@@ -1,0 +1,271 @@
+#include <csignal>
+#include <cstring>
+#include <iostream>
+#include <new>
+#include <set>
+#include <unistd.h>
+
+#include "describe.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/cli/command.h"
+#include "osteo/cli/report.h"
+#include "osteo/pipeline/pipeline.h"
+#include "progress.h"
+
+namespace osteo::cli {
+namespace {
+
+std::atomic<bool> g_cancel{false};
+
+extern "C" void on_signal(int) {
+  // The first asks the work to stop and clean up; a second ends the program at once.
+  if (g_cancel.exchange(true)) ::_exit(130);
+}
+
+struct Parsed {
+  std::vector<std::string> positionals;
+  std::map<std::string, std::string> files;  // --mask FILE, --labels-out FILE: flag without dashes -> file
+  std::vector<std::pair<std::string, std::string>> settings;
+};
+
+Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags, bool takes_settings) {
+  Parsed parsed;
+  std::vector<std::string> known{"--help"};
+  for (const auto& f : fields) known.push_back(f.flag());
+  for (const auto& f : file_flags) known.push_back("--" + f);
+  if (takes_settings) known.emplace_back("--set");
+  bool only_positionals = false;
+  for (std::size_t i = 0; i < args.size(); ++i) {
+    const std::string& arg = args[i];
+    if (arg == "--" && !only_positionals) {
+      only_positionals = true;
+      continue;
+    }
+    const bool short_out = arg == "-o";
+    if (only_positionals || !arg.starts_with('-') || arg == "-" || (arg.size() > 1 && (std::isdigit(static_cast<unsigned char>(arg[1])) != 0))) {
+      parsed.positionals.push_back(arg);
+      continue;
+    }
+    const std::size_t equals = arg.find('=');
+    std::string name = short_out ? "--out" : arg.substr(0, equals);
+    std::optional<std::string> value;
+    if (equals != std::string::npos && !short_out) value = arg.substr(equals + 1);
+    const auto take_value = [&]() -> std::string {
+      if (value) return *value;
+      if (i + 1 >= args.size()) throw Error(ExitCode::usage, name + " needs a value");
+      return args[++i];
+    };
+    if (takes_settings && name == "--set") {
+      const std::string text = take_value();
+      const std::size_t at = text.find('=');
+      if (at == std::string::npos || at == 0) throw Error(ExitCode::usage, "--set: '" + text + "' is not NAME=VALUE");
+      parsed.settings.emplace_back(text.substr(0, at), text.substr(at + 1));
+      continue;
+    }
+    if (const auto it = std::find(file_flags.begin(), file_flags.end(), name.size() > 2 ? name.substr(2) : ""); it != file_flags.end()) {
+      parsed.files[*it] = take_value();
+      continue;
+    }
+    const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.flag() == name; });
+    if (field != fields.end()) {
+      if (field->kind() == "flag") {
+        field->from_text(value.value_or("true"));
+      } else {
+        field->from_text(take_value());
+      }
+      continue;
+    }
+    // --no-fill for a flag that is on by default.
+    if (name.starts_with("--no-")) {
+      const auto off = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.kind() == "flag" && f.flag() == "--" + name.substr(5); });
+      if (off != fields.end()) {
+        off->from_text("false");
+        continue;
+      }
+    }
+    const std::string near = nearest_name(name, known);
+    throw Error(ExitCode::usage, "there is no flag " + name, near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
+  }
+  return parsed;
+}
+
+int run_stage(const Registry& registry, Stage& stage, const std::vector<std::string>& args, Invocation& invocation, Common::Params& common,
+              const std::function<void()>& ready) {
+  const StageInfo& info = stage.info();
+  auto fields = stage.fields();
+  for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
+  std::vector<std::string> file_flags;
+  std::vector<std::string> names;
+  std::size_t required = 0;
+  for (const Port& p : info.inputs) {
+    if (p.optional) {
+      file_flags.push_back(p.name);
+    } else {
+      names.push_back("<" + p.name + ">");
+      ++required;
+    }
+  }
+  for (const Port& p : info.outputs) {
+    if (p.optional) {
+      file_flags.push_back(p.name + "-out");
+    } else {
+      names.push_back("<" + p.name + ".out>");
+      ++required;
+    }
+  }
+  const Parsed parsed = parse(args, fields, file_flags, false);
+  if (parsed.positionals.size() != required) {
+    std::string wanted;
+    for (const auto& n : names) wanted += " " + n;
+    throw Error(ExitCode::usage, "osteo " + info.name + " takes" + wanted + "; " + std::to_string(parsed.positionals.size()) + " of " + std::to_string(required) + " were given",
+                "'osteo help " + info.name + "' tells more");
+  }
+  ready();
+  // The same code path as a pipeline file with one node.
+  PipelineNode node;
+  node.id = node.stage = info.name;
+  std::size_t next = 0;
+  for (const Port& p : info.inputs) {
+    if (!p.optional) {
+      node.inputs[p.name].file = parsed.positionals[next++];
+    } else if (const auto it = parsed.files.find(p.name); it != parsed.files.end()) {
+      node.inputs[p.name].file = it->second;
+    }
+  }
+  for (const Port& p : info.outputs) {
+    if (!p.optional) {
+      node.outputs[p.name] = parsed.positionals[next++];
+    } else if (const auto it = parsed.files.find(p.name + "-out"); it != parsed.files.end()) {
+      node.outputs[p.name] = it->second;
+    }
+  }
+  for (const FieldRef& f : stage.fields()) node.params[std::string(f.doc.name)] = f.to_text();
+  const auto results = run_pipeline({info.name, "", {node}}, registry, {.overwrite = common.force, .reuse = false}, invocation.context);
+  invocation.end_progress();
+  print_results(results, invocation);
+  return 0;
+}
+
+void print_error(const Error& e, std::ostream& err) {
+  err << "osteo: " << e.what() << '\n';
+  if (!e.advice().empty()) err << "  " << e.advice() << '\n';
+}
+
+}  // namespace
+
+Command* Program::find(std::string_view name) const {
+  for (const auto& c : commands) {
+    if (c->info().name == name) return c.get();
+  }
+  return nullptr;
+}
+
+int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err) {
+  std::vector<std::string> args(argv + 1, argv + argc);
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::signal(SIGXFSZ, SIG_IGN);
+  std::unique_ptr<ProgressPrinter> printer;
+  try {
+    if (args.empty()) {
+      err << program_help(program);
+      return static_cast<int>(ExitCode::usage);
+    }
+    const std::string name = args.front();
+    args.erase(args.begin());
+    const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
+    if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
+      out << program_help(program);
+      return 0;
+    }
+    if (name == "--version") {
+      out << "osteo " << program_version() << "\n" << program.licence << "\n";
+      return 0;
+    }
+    const std::string subject = name == "help" ? args.front() : name;
+    Command* const command = program.find(subject);
+    if (command == nullptr && !program.registry.has(subject)) {
+      std::vector<std::string> known = program.registry.names();
+      for (const auto& c : program.commands) known.push_back(c->info().name);
+      known.emplace_back("help");
+      const std::string near = nearest_name(subject, known);
+      throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'", near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
+    }
+    if (name == "help" || wants_help) {
+      out << (command != nullptr ? command_help(*command) : stage_help(*program.registry.make(subject)));
+      return 0;
+    }
+    if (command == nullptr) {
+      const auto stage = program.registry.make(subject);
+      if (std::find(args.begin(), args.end(), "--xml") != args.end()) return out << stage_xml(*stage), 0;
+      if (std::find(args.begin(), args.end(), "--describe") != args.end()) return out << stage_json(*stage), 0;
+    }
+
+    Common::Params common;
+    Invocation invocation{program.registry, {}, {}, {}, {}, out, err, [] {}};
+    const auto ready = [&] {
+      printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
+      invocation.common = common;
+      invocation.context.threads = common.threads;
+      invocation.context.seed = static_cast<std::uint64_t>(common.seed);
+      invocation.context.set_cancel_flag(&g_cancel);
+      invocation.context.on_progress([&](double f, std::string_view a) { printer->update(f, a); });
+      invocation.context.on_log([&](LogLevel level, std::string_view text) {
+        printer->message(level == LogLevel::warning ? "warning: " + std::string(text) : std::string(text));
+      });
+      invocation.end_progress = [&] { printer->clear(); };
+    };
+    int code = 0;
+    // 'osteo import --list FOLDER' asks what is there; that is the verb 'series'.
+    if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() && program.find("series") != nullptr) {
+      args.erase(std::find(args.begin(), args.end(), "--list"));
+      Command* const series = program.find("series");
+      auto fields = series->fields();
+      for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
+      invocation.arguments = parse(args, fields, {}, false).positionals;
+      ready();
+      code = series->run(invocation);
+    } else if (command == nullptr) {
+      code = run_stage(program.registry, *program.registry.make(subject), args, invocation, common, ready);
+    } else {
+      auto fields = command->fields();
+      for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
+      Parsed parsed = parse(args, fields, {}, true);
+      const auto& wanted = command->info().positionals;
+      const auto required = static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
+      if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {
+        std::string list;
+        for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
+        throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list), "'osteo help " + subject + "' tells more");
+      }
+      invocation.arguments = std::move(parsed.positionals);
+      invocation.settings = std::move(parsed.settings);
+      ready();
+      code = command->run(invocation);
+    }
+    if (printer) printer->clear();
+    out.flush();
+    if (!out) throw Error(ExitCode::cannot_write, "standard output cannot be written");
+    return code;
+  } catch (const Error& e) {
+    if (printer) printer->clear();
+    print_error(e, err);
+    remove_temporaries();
+    return static_cast<int>(e.code());
+  } catch (const std::bad_alloc&) {
+    if (printer) printer->clear();
+    print_error(Error(ExitCode::resources, "out of memory", "use larger voxels or a smaller region"), err);
+    remove_temporaries();
+    return static_cast<int>(ExitCode::resources);
+  } catch (const std::exception& e) {
+    if (printer) printer->clear();
+    print_error(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"), err);
+    remove_temporaries();
+    return static_cast<int>(ExitCode::unspecified);
+  }
+}
+
+}  // namespace osteo::cli

@@ -1,0 +1,112 @@
+#include "osteo/pipeline/formats.h"
+
+#include <algorithm>
+#include <array>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/grid/grid_io.h"
+#include "osteo/io/dicom.h"
+#include "osteo/io/surface_io.h"
+#include "osteo/io/volume_io.h"
+#include "osteo/stage/stage.h"
+
+namespace osteo {
+namespace {
+
+struct Suffixes {
+  DataKind kind;
+  std::string_view writable;
+};
+constexpr std::array<Suffixes, 5> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
+                                              {DataKind::labels, ".nrrd .nii .nii.gz .mha .vti"},
+                                              {DataKind::grid, ".vdb"},
+                                              {DataKind::surface, ".ply .stl .obj .vtp"},
+                                              {DataKind::picture, ".png"}}};
+
+bool accepts(std::span<const DataKind> kinds, DataKind kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); }
+
+}  // namespace
+
+std::string suffixes_of(DataKind kind) {
+  for (const auto& s : kSuffixes) {
+    if (s.kind == kind) return std::string(s.writable) + (kind == DataKind::image ? ", or a folder name without suffix for DICOM" : "");
+  }
+  return {};
+}
+
+Data load_data(const fs::path& path, std::span<const DataKind> accepted, const Context& context) {
+  if (accepts(accepted, DataKind::source)) {
+    require_readable(path);
+    return Source{path};
+  }
+  require_readable(path);
+  const auto wrong = [&](DataKind found) {
+    return Error(ExitCode::usage, "'" + path.string() + "' is a " + std::string(kind_name(found)) + " by its name; " + kinds_text(accepted) + " is wanted");
+  };
+  if (path.extension() == ".vdb") {
+    if (!accepts(accepted, DataKind::grid)) throw wrong(DataKind::grid);
+    return load_grid(path);
+  }
+  if (is_surface_file(path)) {
+    if (!accepts(accepted, DataKind::surface)) throw wrong(DataKind::surface);
+    return load_surface(path);
+  }
+  if (path.extension() == ".png") {
+    if (!accepts(accepted, DataKind::picture)) throw wrong(DataKind::picture);
+    return load_picture(path);
+  }
+  if (fs::is_directory(path)) {
+    throw Error(ExitCode::usage, "'" + path.string() + "' is a folder; " + kinds_text(accepted) + " is wanted",
+                "'osteo import FOLDER ct.nrrd' reads a folder of DICOM files");
+  }
+  const bool image = accepts(accepted, DataKind::image), labels = accepts(accepted, DataKind::labels);
+  if (!image && !labels) {
+    if (is_volume_file(path)) throw wrong(DataKind::image);
+    throw Error(ExitCode::usage, "'" + path.string() + "' is no " + kinds_text(accepted) + " by its name");
+  }
+  if (image && labels) {
+    if (holds_labels(path, context)) return load_labels(path, context);
+    return load_image(path, context);
+  }
+  if (labels) return load_labels(path, context);
+  return load_image(path, context);
+}
+
+void require_savable(DataKind kind, const fs::path& path) {
+  if (kind == DataKind::image && !path.has_extension()) return;
+  const std::string name = path.filename().string();
+  for (const auto& s : kSuffixes) {
+    if (s.kind != kind) continue;
+    std::string_view rest = s.writable;
+    while (!rest.empty()) {
+      const std::size_t space = rest.find(' ');
+      const std::string_view suffix = rest.substr(0, space);
+      if (name.size() > suffix.size() && name.ends_with(suffix)) return;
+      rest = space == std::string_view::npos ? std::string_view() : rest.substr(space + 1);
+    }
+  }
+  throw Error(ExitCode::usage, "cannot write a " + std::string(kind_name(kind)) + " as '" + name + "'", "name it " + suffixes_of(kind));
+}
+
+void save_data(const Data& data, const fs::path& path, const Context& context) {
+  require_savable(kind_of(data), path);
+  switch (kind_of(data)) {
+    case DataKind::image:
+      if (!path.has_extension()) {
+        save_dicom_series(std::get<Image>(data), path, context);
+      } else {
+        save_image(std::get<Image>(data), path);
+      }
+      return;
+    case DataKind::labels: save_labels(std::get<Labels>(data), path); return;
+    case DataKind::grid: save_grid(std::get<SparseGrid>(data), path); return;
+    case DataKind::surface: save_surface(*std::get<Surface>(data), path); return;
+    case DataKind::picture: save_picture(std::get<Picture>(data), path); return;
+    case DataKind::none:
+    case DataKind::source: break;
+  }
+  throw Error(ExitCode::unspecified, "a stage returned nothing for '" + path.string() + "'");
+}
+
+}  // namespace osteo

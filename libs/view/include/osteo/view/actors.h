@@ -1,0 +1,20 @@
+// How things look in 3D, the same in snapshots and in the window.
+#pragma once
+#include <vtkSmartPointer.h>
+
+#include "osteo/data/vec.h"
+
+class vtkActor;
+class vtkPolyData;
+class vtkRenderer;
+
+namespace osteo {
+
+/// Bone under soft light. The data may be replaced later through the actor's mapper.
+[[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
+/// Dark blue background, key, fill and head light.
+void set_up_scene(vtkRenderer* renderer);
+/// Camera that sees a ball of `radius_mm` around `centre_mm` from `eye` (unit, LPS), head up.
+void look_at(vtkRenderer* renderer, Vec3 centre_mm, double radius_mm, Vec3 eye);
+
+}  // namespace osteo

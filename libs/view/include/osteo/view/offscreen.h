@@ -1,0 +1,31 @@
+// Rendering without a window or an X server: an EGL context in memory under a VTK render window.
+#pragma once
+#include <memory>
+
+#include "osteo/data/data.h"
+
+class vtkRenderer;
+class vtkGenericOpenGLRenderWindow;
+
+namespace osteo {
+
+class OffscreenWindow {
+ public:
+  /// Error(failed) when there is no OpenGL at all (install Mesa: libegl1 and libgl1-mesa-dri).
+  OffscreenWindow(int width, int height);
+  ~OffscreenWindow();
+  OffscreenWindow(const OffscreenWindow&) = delete;
+  OffscreenWindow& operator=(const OffscreenWindow&) = delete;
+
+  [[nodiscard]] vtkGenericOpenGLRenderWindow* window();
+  [[nodiscard]] Picture render();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What the window shows now, as a picture.
+[[nodiscard]] Picture grab(vtkGenericOpenGLRenderWindow* window);
+
+}  // namespace osteo

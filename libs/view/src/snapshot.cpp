@@ -1,0 +1,215 @@
+#include "osteo/view/snapshot.h"
+
+#include <vtkActor.h>
+#include <vtkFlyingEdges3D.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkImageConstantPad.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkRenderer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "osteo/base/error.h"
+#include "osteo/grid/sampler.h"
+#include "osteo/io/vtk_data.h"
+#include "osteo/mesh/bone_surface.h"
+#include "osteo/view/actors.h"
+#include "osteo/view/offscreen.h"
+#include "osteo/view/slices.h"
+
+namespace osteo {
+namespace {
+
+double sample_linear(const Image& image, Vec3 world) {
+  const Vec3 x = image.frame.index_from_world(world);
+  int lo[3];
+  double t[3];
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (x[a] < -0.5 || x[a] > image.frame.dims[a] - 0.5) return -1024;
+    const double c = std::clamp(x[a], 0.0, image.frame.dims[a] - 1.0);
+    lo[a] = std::min(static_cast<int>(c), std::max(0, image.frame.dims[a] - 2));
+    t[a] = c - lo[a];
+  }
+  double sum = 0;
+  for (int c = 0; c < 8; ++c) {
+    const double w = ((c & 1) != 0 ? t[0] : 1 - t[0]) * ((c & 2) != 0 ? t[1] : 1 - t[1]) * ((c & 4) != 0 ? t[2] : 1 - t[2]);
+    if (w > 0) sum += w * image.at(lo[0] + (c & 1), lo[1] + (c >> 1 & 1), lo[2] + (c >> 2));
+  }
+  return sum;
+}
+
+int sample_label(const Labels& labels, Vec3 world) {
+  const Vec3 x = labels.frame.index_from_world(world);
+  int v[3];
+  for (std::size_t a = 0; a < 3; ++a) {
+    v[a] = static_cast<int>(std::floor(x[a] + 0.5));
+    if (v[a] < 0 || v[a] >= labels.frame.dims[a]) return 0;
+  }
+  return labels.at(v[0], v[1], v[2]);
+}
+
+GreyAt grey_of(const Data& data) {
+  if (const auto* image = std::get_if<Image>(&data)) return [image](Vec3 p) { return grey_of_hu(sample_linear(*image, p)); };
+  if (const auto* grid = std::get_if<SparseGrid>(&data)) {
+    auto sampler = std::make_shared<GridSampler>(*grid);
+    if (grid->name == "hu") return [sampler](Vec3 p) { return grey_of_hu(static_cast<double>(sampler->nearest(p))); };
+    return [sampler](Vec3 p) { return 255.0 * static_cast<double>(std::clamp(sampler->nearest(p), 0.0F, 1.0F)); };
+  }
+  return nullptr;
+}
+
+LabelAt label_of(const Data& data) {
+  if (const auto* labels = std::get_if<Labels>(&data)) return [labels](Vec3 p) { return sample_label(*labels, p); };
+  if (const auto* grid = std::get_if<SparseGrid>(&data)) {
+    auto sampler = std::make_shared<GridSampler>(*grid);
+    return [sampler](Vec3 p) { return sampler->nearest(p) >= 0.5F ? 1 : 0; };
+  }
+  return nullptr;
+}
+
+std::pair<Vec3, Vec3> bounds_of(const Data& data) {
+  Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+  const auto add = [&](Vec3 p) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], p[a]);
+      hi[a] = std::max(hi[a], p[a]);
+    }
+  };
+  const auto add_frame = [&](const Frame& f) {
+    for (int c = 0; c < 8; ++c) add(f.world_from_index({(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
+  };
+  if (const auto* image = std::get_if<Image>(&data)) add_frame(image->frame);
+  if (const auto* labels = std::get_if<Labels>(&data)) add_frame(labels->frame);
+  if (const auto* grid = std::get_if<SparseGrid>(&data)) return GridSampler::bounds_mm(*grid);
+  if (const auto* surface = std::get_if<Surface>(&data)) {
+    for (const auto& p : (*surface)->points_mm) add({p[0], p[1], p[2]});
+  }
+  return {lo, hi};
+}
+
+// Isosurface of a dense volume, closed at its border.
+vtkSmartPointer<vtkPolyData> isosurface(vtkImageData* image, double value, double outside) {
+  vtkNew<vtkImageConstantPad> pad;
+  int e[6];
+  image->GetExtent(e);
+  pad->SetInputData(image);
+  pad->SetOutputWholeExtent(e[0] - 1, e[1] + 1, e[2] - 1, e[3] + 1, e[4] - 1, e[5] + 1);
+  pad->SetConstant(outside);
+  vtkNew<vtkFlyingEdges3D> edges;
+  edges->SetInputConnection(pad->GetOutputPort());
+  edges->SetValue(0, value);
+  edges->ComputeScalarsOff();
+  edges->ComputeGradientsOff();
+  edges->ComputeNormalsOn();
+  edges->Update();
+  return edges->GetOutput();
+}
+
+vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
+  if (const auto* surface = std::get_if<Surface>(&s.surface)) return to_vtk(**surface);
+  for (const Data* data : {&s.mask, &s.subject}) {
+    if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
+    if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
+      return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
+    }
+    if (const auto* labels = std::get_if<Labels>(data)) return isosurface(to_vtk(*labels), 0.5, 0);
+    if (const auto* image = std::get_if<Image>(data)) return isosurface(to_vtk(*image), p.bone_hu, -1024);
+    if (const auto* grid = std::get_if<SparseGrid>(data)) {
+      return to_vtk(surface_nets(to_bricks(*grid), static_cast<float>(p.bone_hu), context).mesh);
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Vec3 eye_direction(ViewFrom from) {
+  switch (from) {
+    case ViewFrom::left_front: return normalized({0.75, -0.62, 0.22});
+    case ViewFrom::left: return {1, 0, 0};
+    case ViewFrom::right: return {-1, 0, 0};
+    case ViewFrom::front: return {0, -1, 0};
+    case ViewFrom::back: return {0, 1, 0};
+    case ViewFrom::above: return {0, 0, 1};
+    case ViewFrom::below: return {0, 0, -1};
+  }
+  return {1, 0, 0};
+}
+
+Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
+  Picture picture{p.width, p.height, {}};
+  picture.rgb.assign(static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height) * 3, 12);
+  const int pw = p.width / 2 - 2, ph = p.height / 2 - 2;
+  const bool flat = !std::holds_alternative<Surface>(s.subject);
+  const auto [lo, hi] = bounds_of(s.subject);
+  const Vec3 centre = (lo + hi) * 0.5, size = hi - lo;
+
+  if (flat) {
+    const bool labels_only = std::holds_alternative<Labels>(s.subject);
+    const GreyAt grey = labels_only ? nullptr : grey_of(s.subject);
+    const LabelAt label = label_of(labels_only ? s.subject : s.mask);
+    for (int n = 0; n < 3; ++n) {
+      context.progress(0.1 * n, "slices");
+      SliceView view;
+      view.plane = static_cast<Plane>(n);
+      view.centre_mm = view.through_mm = centre;
+      view.width = pw;
+      view.height = ph;
+      const double w = n == 2 ? size.y : size.x, h = n == 0 ? size.y : size.z;
+      view.mm_per_pixel = std::max({w / (pw - 8), h / (ph - 8), 1e-3});
+      const int x = n == 1 ? p.width - pw : 0, y = n == 2 ? p.height - ph : 0;
+      paste(picture, draw_slice(view, grey, label), x, y);
+      write_directions(picture, view, x, y);
+    }
+  }
+
+  context.progress(0.3, "surface");
+  const auto surface = surface_of(s, p, context.sub(0.3, 0.6));
+  const int sw = flat ? pw : p.width, sh = flat ? ph : p.height;
+  if (surface != nullptr && surface->GetNumberOfCells() > 0) {
+    context.progress(0.6, "drawing");
+    OffscreenWindow window(sw, sh);
+    vtkNew<vtkRenderer> renderer;
+    window.window()->AddRenderer(renderer);
+    set_up_scene(renderer);
+    renderer->AddActor(make_bone_actor(surface));
+    double b[6];
+    surface->GetBounds(b);
+    const Vec3 middle{(b[0] + b[1]) / 2, (b[2] + b[3]) / 2, (b[4] + b[5]) / 2};
+    const double radius = 0.5 * length({b[1] - b[0], b[3] - b[2], b[5] - b[4]});
+    look_at(renderer, middle, 0.82 * radius, eye_direction(p.view));
+    paste(picture, window.render(), p.width - sw, p.height - sh);
+    context.report("triangles_drawn", static_cast<std::int64_t>(surface->GetNumberOfCells()));
+  } else {
+    write_text(picture, "no bone at this threshold", p.width - sw + 20, p.height - sh / 2, 18);
+  }
+  write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]), p.width - sw + 10, p.height - sh + 24, 15, {150, 165, 180});
+  if (!p.title.empty()) write_text(picture, p.title, p.width - sw + 10, p.height - 12, 16);
+  context.progress(1.0);
+  return picture;
+}
+
+StageInfo SnapshotStage::info() {
+  return {.name = "snapshot",
+          .version = 1,
+          .synopsis = "a picture (PNG) of a CT, mask, bone grid or surface",
+          .description =
+              "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit view in "
+              "3D. Needs no display.",
+          .inputs = {{"subject", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface}, "what to show"},
+                     {"mask", {DataKind::labels, DataKind::grid}, "tinted over the cuts and shown in 3D", true},
+                     {"surface", {DataKind::surface}, "shown in 3D", true}},
+          .outputs = {{"picture", {DataKind::picture}, "the picture"}},
+          .references = {},
+          .example = "osteo snapshot ct.nrrd picture.png --mask bone.nrrd --view left"};
+}
+
+std::vector<Data> SnapshotStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  return {snapshot({inputs[0], inputs[1], inputs[2]}, params, context)};
+}
+
+}  // namespace osteo
