@@ -51,6 +51,98 @@ struct DocsCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
+struct PrepareCommand {
+  struct Params {
+    std::string out;
+    double lower = 300;
+    double spacing_mm = 0.5;
+    std::string series;
+    std::string axes;
+    std::string pipeline;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder of the case, made when it is not there (also -o)"}, p.out);
+    visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
+    visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
+    visit({"series", "DICOM series to take, by number or UID (empty: the one with the most slices)"}, p.series);
+    visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
+    visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+enum class BurrChoice : int { cutting, diamond };
+enum class Side : int { left, right };
+
+template <>
+struct EnumNames<BurrChoice> {
+  static constexpr std::array<std::string_view, 2> values{"cutting", "diamond"};
+};
+template <>
+struct EnumNames<Side> {
+  static constexpr std::array<std::string_view, 2> values{"left", "right"};
+};
+
+struct RehearseCommand {
+  struct Params {
+    bool headless = false;
+    std::string script;
+    std::string out;
+    BurrChoice burr = BurrChoice::cutting;
+    double diameter_mm = 4;
+    Side side = Side::left;
+    double seconds = 60;
+    double rate_hz = 1000;
+    bool fast = false;
+    std::string resume;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"headless", "without a window: a scripted hand in front of the same servo"}, p.headless);
+    visit({"script", "strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
+    visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
+    visit({"burr", "kind of burr at the start"}, p.burr);
+    visit({"diameter_mm", "of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
+    visit({"side", "of the patient, for the built-in strokes"}, p.side);
+    visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
+    visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
+    visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
+    visit({"resume", "go on from the end of this session"}, p.resume);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct ReplayCommand {
+  struct Params {
+    std::string case_folder;
+    std::string surface_out;
+    std::string bone_out;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
+    visit({"surface_out", "also write the surface at the end of the session (.ply, .stl, ...)"}, p.surface_out);
+    visit({"bone_out", "also write the bone at the end of the session (.vdb)"}, p.bone_out);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct DemoCommand {
+  struct Params {
+    std::string out = "out/demo";
+    double seconds = 10;
+    std::string axes;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for everything that is made"}, p.out);
+    visit({"seconds", "of drilling", "s", 1, 3600}, p.seconds);
+    visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
 /// All stages and commands of osteo.
 [[nodiscard]] cli::Program& osteo_program();
 

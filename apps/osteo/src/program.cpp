@@ -26,6 +26,10 @@ cli::Program& osteo_program() {
     p.add<InfoCommand>();
     p.add<SeriesCommand>();
     p.add<RunCommand>();
+    p.add<PrepareCommand>();
+    p.add<RehearseCommand>();
+    p.add<ReplayCommand>();
+    p.add<DemoCommand>();
     p.add<DocsCommand>();
     return p;
   }();

@@ -160,9 +160,8 @@ double tissue_hu(Tissue tissue) { return kHu[static_cast<std::size_t>(tissue)]; 
 Tissue phantom_tissue(Vec3 p) {
   Tissue tissue = Tissue::air;
   if (length(p - kMarker) < 5) return Tissue::left_marker;
-  if (ellipsoid(p, {0, 0, 5}, {84, 100, 98}) >= 1) {
-    return p.z < -40 && std::hypot(p.x / 60, (p.y + 20) / 80) < 1 ? Tissue::soft : Tissue::air;
-  }
+  const bool face = p.z < -30 && std::hypot(p.x / 62, (p.y + 22) / 84) < 1;
+  if (!face && ellipsoid(p, {0, 0, 5}, {84, 100, 98}) >= 1) return Tissue::air;
   if (temporal_tissue({std::abs(p.x), p.y, p.z}, tissue)) return tissue;
   if (skull_tissue(p, tissue)) return tissue;
   if (jaw_tissue(p, tissue)) return tissue;

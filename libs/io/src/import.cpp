@@ -23,6 +23,25 @@ const DicomSeries& choose(const std::vector<DicomSeries>& all, const std::string
   throw Error(ExitCode::usage, "there is no series '" + wanted + "' (" + list + ")", "'osteo import --list FOLDER' shows the series");
 }
 
+// Direction columns from letters: L R A P H F, with S and I for H and F.
+Mat3 direction_of(const std::string& axes) {
+  Mat3 m;
+  int used = 0;
+  for (std::size_t a = 0; a < 3 && axes.size() == 3; ++a) {
+    static constexpr std::string_view kLetters = "LPSRAIHF";
+    static constexpr int kAxis[] = {0, 1, 2, 0, 1, 2, 2, 2}, kSign[] = {1, 1, 1, -1, -1, -1, 1, -1};
+    const std::size_t at = kLetters.find(static_cast<char>(std::toupper(static_cast<unsigned char>(axes[a]))));
+    if (at == std::string_view::npos) break;
+    m.column[a] = {};
+    m.column[a][static_cast<std::size_t>(kAxis[at])] = kSign[at];
+    used |= 1 << kAxis[at];
+  }
+  if (used != 7) {
+    throw Error(ExitCode::usage, "--axes: '" + axes + "' is not three letters, one of L R, one of A P, one of S I", "LPS is the usual order; LPI when the first slice is the top of the head");
+  }
+  return m;
+}
+
 void report_values(const Image& image, const Context& context) {
   std::int16_t lo = 32767, hi = -32768;
   std::size_t air = 0, soft = 0;
@@ -60,6 +79,12 @@ Image import_ct(const fs::path& source, const ImportParams& params, const Contex
     image = load_dicom_series(series, params.max_gap_mm, context.sub(0.2, 1.0));
     context.report("source_kind", std::string("DICOM"));
   }
+  if (!params.axes.empty()) {
+    const Vec3 centre = image.frame.centre_mm();
+    image.frame.direction = direction_of(params.axes);
+    image.frame.origin_mm += centre - image.frame.centre_mm();
+  }
+  context.report("axes", orientation_code(image.frame));
   report_values(image, context);
   return image;
 }

@@ -10,6 +10,7 @@ namespace osteo {
 struct ImportParams {
   std::string series;
   double max_gap_mm = 8;
+  std::string axes;
 };
 
 /// A DICOM folder or file, or a volume file. Reports the source's kind, the range of values and whether they look like HU.
@@ -21,6 +22,7 @@ struct ImportStage {
   static void describe(Params& p, auto& visit) {
     visit({"series", "DICOM series to take, by number or UID (empty: the one with the most slices)"}, p.series);
     visit({"max_gap_mm", "widest distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
+    visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"}, p.axes);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -1,0 +1,58 @@
+// demo: the main job from end to end.
+#include <ostream>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/image/phantom.h"
+#include "osteo/io/dicom.h"
+
+namespace osteo {
+
+cli::CommandInfo DemoCommand::info() {
+  return {"demo", "the whole way once: CT, case, drilled session, pictures",
+          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, and a replay that must come out the same.",
+          {{"source", "DICOM folder or volume file", true}}, "osteo demo"};
+}
+
+int DemoCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path out = p.out;
+  fs::create_directories(out);
+  const bool phantom = io.arguments.empty();
+  fs::path source = phantom ? out / "phantom-dicom" : fs::path(io.arguments[0]);
+  const auto say = [&](const std::string& text) {
+    io.end_progress();
+    if (!io.common.quiet) io.err << "\n== " << text << '\n';
+  };
+  if (phantom && !fs::exists(source)) {
+    say("making a CT of a phantom head: " + source.string());
+    PhantomParams params;
+    save_dicom_series(make_phantom(params, io.context).ct, source, io.context);
+  }
+  say("preparing the case: " + (out / "case").string());
+  PrepareCommand::Params prepare;
+  prepare.out = (out / "case").string();
+  prepare.axes = p.axes;
+  if (phantom) prepare.lower = 500;  // half-way between the phantom's bone and tissue
+  io.arguments = {source.string()};
+  PrepareCommand::run(prepare, io);
+
+  say("drilling for " + format_number(p.seconds) + " s");
+  const fs::path session = out / "session";
+  fs::remove_all(session);
+  RehearseCommand::Params rehearse;
+  rehearse.headless = true;
+  rehearse.out = session.string();
+  rehearse.seconds = p.seconds;
+  io.arguments = {prepare.out};
+  RehearseCommand::run(rehearse, io);
+
+  say("replaying the session");
+  io.arguments = {session.string()};
+  const int code = ReplayCommand::run({}, io);
+  say("done; look at\n   " + (out / "case/preview.png").string() + "\n   " + (session / "before.png").string() + "\n   " + (session / "after.png").string() +
+      "\nand drill yourself:  ./osteo rehearse " + prepare.out);
+  return code;
+}
+
+}  // namespace osteo

@@ -1,0 +1,215 @@
+// rehearse and replay: drilling without a window, and doing it again.
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <thread>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/cli/report.h"
+#include "osteo/grid/grid_io.h"
+#include "osteo/io/surface_io.h"
+#include "osteo/scene/case.h"
+#include "osteo/scene/rehearsal.h"
+#include "osteo/session/script_file.h"
+#include "osteo/view/snapshot.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+fs::path stream_path(const fs::path& session) { return fs::is_directory(session) ? session / "stream.oss" : session; }
+
+// CASE/sessions/1, 2, ...: the first that is free.
+fs::path new_session_folder(const fs::path& wanted, const fs::path& case_folder) {
+  std::error_code ec;
+  fs::path folder = wanted;
+  if (folder.empty()) {
+    for (int n = 1;; ++n) {
+      folder = case_folder / "sessions" / std::to_string(n);
+      if (!fs::exists(folder)) break;
+    }
+  } else if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder))) {
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already", "give another name for the session; a session is never overwritten");
+  }
+  fs::create_directories(folder, ec);
+  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message());
+  return folder;
+}
+
+ordered_json loop_json(const LoopStats& s) {
+  const auto quantiles = [](const Histogram& h) {
+    return ordered_json{{"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
+  };
+  ordered_json j;
+  j["work_us"] = quantiles(s.work);
+  j["wake_up_lateness_us"] = quantiles(s.lateness);
+  j["missed_by_work"] = s.missed_by_work;
+  j["missed_by_machine"] = s.missed_by_machine;
+  j["realtime_priority"] = s.realtime_granted;
+  if (!s.realtime_granted) j["realtime_refusal"] = s.realtime_refusal;
+  j["memory_locked"] = s.memory_locked;
+  return j;
+}
+
+// The window is a program of its own, so that servers need neither GLFW nor a display.
+int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-rehearse";
+  if (!fs::exists(program)) throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)", "build with -DOSTEO_WINDOW=ON, or use --headless");
+  std::vector<std::string> args{program.string(), io.arguments[0], "--burr", std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]), "--diameter-mm",
+                                format_number(p.diameter_mm), "--rate-hz", format_number(p.rate_hz)};
+  if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
+  if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
+  std::vector<char*> argv;
+  for (auto& a : args) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  ::execv(program.c_str(), argv.data());
+  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+}
+
+}  // namespace
+
+cli::CommandInfo RehearseCommand::info() {
+  return {"rehearse", "drill the bone of a case, in a window or by script",
+          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same servo, and the session, "
+          "pictures from before and after, and a summary are written.",
+          {{"case", "a folder made by prepare"}}, "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
+}
+
+int RehearseCommand::run(const Params& p, cli::Invocation& io) {
+  const int tool = burr_index(std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]), p.diameter_mm);
+  if (!p.headless) return open_window(p, io);
+  const Case the_case = load_case(io.arguments[0]);
+  io.context.progress(0, "loading");
+  BrickGrid bone = to_bricks(the_case.bone);
+  if (!p.resume.empty()) {
+    const ReplayResult r = replay(read_session(stream_path(p.resume)), bone, io.context.sub(0, 0.1));
+    if (!r.identical) throw Error(ExitCode::failed, "the session to resume from does not replay: " + r.difference);
+  }
+  const Script script = p.script.empty() ? make_default_script(bone, p.side == Side::left, tool, p.seconds) : load_script(p.script);
+  const fs::path folder = new_session_folder(p.out, the_case.folder);
+
+  // Before and after are seen from where the drill came, around the middle of its strokes.
+  Vec3 site{};
+  for (const auto& w : script.waypoints) site += w.at_mm / static_cast<double>(script.waypoints.size());
+  const Vec3 eye = normalized(script.axis + Vec3{0, -0.2, 0.15});
+  const auto draw = [&](const BrickGrid& b, const char* name) {
+    const TriMesh mesh = surface_nets(b, 0.5F, io.context).mesh;
+    save_picture(draw_surface(mesh, site, 32, eye, 900, 700), folder / name);
+    return mesh;
+  };
+  draw(bone, "before.png");
+  write_file(folder / "strokes.json", script_json(script));
+
+  RehearsalOptions options;
+  options.rate_hz = p.rate_hz;
+  options.session_file = folder / "stream.oss";
+  const double volume_before = bone.sum() * bone.frame().voxel_volume_mm3();
+  Rehearsal rehearsal(std::move(bone), std::make_unique<ScriptedDevice>(script, p.rate_hz), options, io.context);
+  RehearsalSummary s;
+  if (p.fast) {
+    s = rehearsal.run_to_end(io.context);
+  } else {
+    rehearsal.start();
+    while (rehearsal.running()) {
+      const double t = static_cast<double>(rehearsal.latest().tick) / p.rate_hz;
+      try {
+        io.context.progress(0.1 + 0.8 * std::min(1.0, t / script.seconds()), "drilling");
+      } catch (const Error&) {
+        rehearsal.stop();  // what was drilled so far stays recorded
+        throw;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    s = rehearsal.stop();
+  }
+  const TriMesh after = draw(rehearsal.bone(), "after.png");
+  save_surface(after, folder / "surface.ply");
+
+  ordered_json j;
+  j["osteotome_session_summary"] = 1;
+  j["case"] = fs::proximate(fs::absolute(the_case.folder), fs::absolute(folder)).string();
+  j["ticks"] = s.ticks;
+  j["rate_hz"] = p.rate_hz;
+  j["burr"] = burr_library()[static_cast<std::size_t>(script.tool)].name();
+  j["removed_mm3"] = s.removed_mm3;
+  j["bone_mm3_before"] = volume_before;
+  j["bone_mm3_after"] = rehearsal.bone().sum() * rehearsal.bone().frame().voxel_volume_mm3();
+  j["bone_hash"] = s.bone_hash;
+  j["surface_hash"] = s.surface_hash;
+  j["session_bytes"] = s.session_bytes;
+  j["ticks_lost_by_readers"] = s.dropped;
+  if (!p.resume.empty()) j["resumed_from"] = fs::proximate(fs::absolute(p.resume), fs::absolute(folder)).string();
+  if (s.loop) j["loop"] = loop_json(*s.loop);
+  write_file(folder / "summary.json", j.dump(2) + "\n");
+
+  io.end_progress();
+  if (!io.common.quiet) {
+    io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
+    if (s.loop) {
+      const LoopStats& l = *s.loop;
+      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
+             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work << ", by the machine " << l.missed_by_machine << "; real-time priority "
+             << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
+    }
+    io.err << "session: " << folder.string() << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay " << folder.string() << '\n';
+  }
+  if (io.common.json) io.out << j.dump(2) << '\n';
+  return 0;
+}
+
+cli::CommandInfo ReplayCommand::info() {
+  return {"replay", "run a session again and prove that it comes out the same",
+          "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; also applies the recorded "
+          "voxel changes and compares that. Exit code 7 when anything differs.",
+          {{"session", "a session folder, or its stream.oss"}}, "osteo replay SESSION"};
+}
+
+int ReplayCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path session_path = io.arguments[0];
+  require_readable(session_path);
+  const Session session = read_session(stream_path(session_path));
+  fs::path case_folder = p.case_folder;
+  fs::path resumed_from;
+  const fs::path summary = session_path / "summary.json";
+  if (fs::is_directory(session_path) && fs::exists(summary)) {
+    const auto j = ordered_json::parse(read_text(summary), nullptr, false);
+    if (case_folder.empty() && j.contains("case")) case_folder = session_path / j["case"].get<std::string>();
+    if (j.contains("resumed_from")) resumed_from = session_path / j["resumed_from"].get<std::string>();
+  }
+  // A session in CASE/sessions/N that was cut before its summary was written.
+  if (case_folder.empty() && fs::exists(session_path / "../../manifest.json")) case_folder = session_path / "../..";
+  if (case_folder.empty()) throw Error(ExitCode::usage, "which case was it recorded on?", "--case-folder CASE");
+  const Case the_case = load_case(case_folder);
+  BrickGrid bone = to_bricks(the_case.bone);
+  if (!resumed_from.empty()) {
+    const ReplayResult before = replay(read_session(stream_path(resumed_from)), bone, io.context);
+    if (!before.identical) throw Error(ExitCode::failed, "the session that this one goes on from differs: " + before.difference);
+  }
+  const ReplayResult r = replay(session, bone, io.context);
+  if (!p.surface_out.empty()) {
+    if (fs::exists(p.surface_out) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");
+    save_surface(surface_nets(bone, 0.5F, io.context).mesh, p.surface_out);
+  }
+  if (!p.bone_out.empty()) {
+    if (fs::exists(p.bone_out) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + p.bone_out + "' exists already", "--force replaces it");
+    save_grid(to_sparse(bone, "density"), p.bone_out);
+  }
+  io.end_progress();
+  ordered_json j{{"ticks", r.ticks}, {"identical", r.identical}, {"complete", r.complete}, {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash}, {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  if (!r.difference.empty()) j["difference"] = r.difference;
+  if (io.common.json) io.out << j.dump(2) << '\n';
+  if (!io.common.quiet) {
+    io.err << "replayed " << r.ticks << " ticks in " << format_number(std::round(r.seconds * 100) / 100) << " s: "
+           << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference) << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
+           << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
+  }
+  return r.identical ? 0 : static_cast<int>(ExitCode::failed);
+}
+
+}  // namespace osteo

@@ -1,0 +1,91 @@
+// Devices: where the hand is, and what it feels.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "osteo/haptics/stream.h"
+#include "osteo/rt/seqlock.h"
+
+namespace osteo {
+
+/// Called by the servo only; no allocation, no exception, no wait.
+class Device {
+ public:
+  virtual ~Device() = default;
+  /// The pose for this tick. `force_n` is the force of the tick before.
+  virtual DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept = 0;
+  /// False when the device has no more to say (end of a script).
+  [[nodiscard]] virtual bool active(std::uint64_t) const noexcept { return true; }
+};
+
+/// Where the hand wants the burr to be.
+struct HandGoal {
+  Vec3 position_mm{};
+  std::array<float, 3> axis{0, 0, 1};
+  std::uint8_t drill_on = 0;
+  std::uint8_t tool = 0;
+};
+
+/// A hand that holds the drill on a damped spring to its goal, so that a mouse or a script rests on bone instead of passing
+/// through it: mass 0.15 kg, 0.8 N/mm, critically damped, at most 6 N. Semi-implicit Euler.
+class SpringHand {
+ public:
+  /// Moves on by dt; the first call starts at the goal.
+  DeviceSample step(const HandGoal& goal, double dt_s, Vec3 force_n) noexcept;
+
+ private:
+  bool started_ = false;
+  Vec3 position_mm_, velocity_mm_s_;
+};
+
+/// The goal is set by another thread (the window).
+class MouseDevice final : public Device {
+ public:
+  void set_goal(const HandGoal& goal) noexcept { goal_.store(goal); }
+  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+
+ private:
+  Seqlock<HandGoal> goal_;
+  HandGoal last_{};
+  SpringHand hand_;
+};
+
+/// Straight moves between points in time.
+struct Script {
+  struct Waypoint {
+    double t_s = 0;
+    Vec3 at_mm;
+    bool drill_on = false;
+  };
+  int tool = 3;  ///< index in burr_library()
+  Vec3 axis{0, 0, 1};
+  std::vector<Waypoint> waypoints;  ///< at least one, times rising
+  [[nodiscard]] double seconds() const { return waypoints.empty() ? 0 : waypoints.back().t_s; }
+};
+
+/// Follows a script by tick number, not by the clock: the same ticks on every run.
+class ScriptedDevice final : public Device {
+ public:
+  ScriptedDevice(Script script, double rate_hz) : script_(std::move(script)), rate_hz_(rate_hz) {}
+  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  [[nodiscard]] bool active(std::uint64_t tick) const noexcept override { return static_cast<double>(tick) / rate_hz_ < script_.seconds(); }
+
+ private:
+  Script script_;
+  double rate_hz_;
+  std::size_t leg_ = 0;
+  SpringHand hand_;
+};
+
+/// Repeats recorded samples.
+class ReplayDevice final : public Device {
+ public:
+  explicit ReplayDevice(std::vector<DeviceSample> samples) : samples_(std::move(samples)) {}
+  DeviceSample read(std::uint64_t tick, double, Vec3) noexcept override { return samples_[tick]; }
+  [[nodiscard]] bool active(std::uint64_t tick) const noexcept override { return tick < samples_.size(); }
+
+ private:
+  std::vector<DeviceSample> samples_;
+};
+
+}  // namespace osteo

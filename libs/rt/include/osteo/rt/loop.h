@@ -1,0 +1,55 @@
+// A thread that calls a function at a fixed rate with the least lateness the machine allows.
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "osteo/rt/histogram.h"
+
+namespace osteo {
+
+struct LoopStats {
+  Histogram work;      ///< time spent in the function
+  Histogram lateness;  ///< wake-up after the planned time: the machine's share
+  std::uint64_t ticks = 0;
+  std::uint64_t missed_by_work = 0;     ///< periods lost because the function took longer than a period
+  std::uint64_t missed_by_machine = 0;  ///< periods lost because the wake-up came late
+  bool realtime_granted = false;
+  bool memory_locked = false;
+  std::string realtime_refusal;  ///< empty, or why
+};
+
+/// SCHED_FIFO priority 80, memory locked, absolute sleeps (clock_nanosleep). When real-time priority is refused the loop runs
+/// all the same with the smallest timer slack, and says so. A late tick does not shift the later ones; periods that passed
+/// meanwhile are skipped and counted.
+class FixedRateLoop {
+ public:
+  /// `tick` returns false to end the loop. It must not throw, allocate or lock.
+  FixedRateLoop(double rate_hz, std::function<bool(std::int64_t lateness_ns)> tick);
+  ~FixedRateLoop();
+  FixedRateLoop(const FixedRateLoop&) = delete;
+  FixedRateLoop& operator=(const FixedRateLoop&) = delete;
+
+  void start();
+  void request_stop() noexcept { stop_ = true; }
+  void join();
+  [[nodiscard]] bool running() const noexcept { return running_; }
+  /// Only after join().
+  [[nodiscard]] const LoopStats& stats() const { return stats_; }
+  /// Whether real-time priority was granted; valid once running() was true.
+  [[nodiscard]] bool realtime() const noexcept { return realtime_; }
+
+ private:
+  void run();
+  double rate_hz_;
+  std::function<bool(std::int64_t)> tick_;
+  std::atomic<bool> stop_{false}, running_{false}, realtime_{false};
+  LoopStats stats_;
+  std::thread thread_;
+};
+
+[[nodiscard]] std::int64_t monotonic_ns() noexcept;
+
+}  // namespace osteo

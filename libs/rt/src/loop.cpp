@@ -1,0 +1,74 @@
+#include "osteo/rt/loop.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <time.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace osteo {
+
+std::int64_t monotonic_ns() noexcept {
+  timespec t{};
+  ::clock_gettime(CLOCK_MONOTONIC, &t);
+  return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
+}
+
+FixedRateLoop::FixedRateLoop(double rate_hz, std::function<bool(std::int64_t)> tick) : rate_hz_(rate_hz), tick_(std::move(tick)) {}
+
+FixedRateLoop::~FixedRateLoop() {
+  request_stop();
+  join();
+}
+
+void FixedRateLoop::start() {
+  running_ = true;
+  thread_ = std::thread([this] { run(); });
+}
+
+void FixedRateLoop::join() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void FixedRateLoop::run() {
+  ::pthread_setname_np(::pthread_self(), "osteo-servo");
+  sched_param priority{};
+  priority.sched_priority = 80;
+  if (const int rc = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority); rc == 0) {
+    stats_.realtime_granted = true;
+  } else {
+    stats_.realtime_refusal = std::strerror(rc);
+    ::prctl(PR_SET_TIMERSLACK, 1);
+  }
+  realtime_ = stats_.realtime_granted;
+  stats_.memory_locked = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+
+  const auto period = static_cast<std::int64_t>(1e9 / rate_hz_);
+  std::int64_t due = monotonic_ns() + period;
+  while (!stop_.load(std::memory_order_relaxed)) {
+    const timespec at{due / 1'000'000'000LL, due % 1'000'000'000LL};
+    while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {
+    }
+    const std::int64_t woke = monotonic_ns();
+    const bool more = tick_(woke - due);
+    const std::int64_t done = monotonic_ns();
+    stats_.work.add(done - woke);
+    stats_.lateness.add(woke - due);
+    ++stats_.ticks;
+    if (!more) break;
+    due += period;
+    if (done >= due) {
+      // Blame: had the wake-up been on time, would the work have fitted?
+      const auto lost = static_cast<std::uint64_t>((done - due) / period + 1);
+      (done - woke >= period ? stats_.missed_by_work : stats_.missed_by_machine) += lost;
+      due += static_cast<std::int64_t>(lost) * period;
+    }
+  }
+  if (stats_.memory_locked) ::munlockall();
+  running_ = false;
+}
+
+}  // namespace osteo

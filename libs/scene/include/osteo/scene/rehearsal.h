@@ -1,0 +1,103 @@
+// A rehearsal put together: bone, device, servo, and the readers of its stream.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+
+#include "osteo/bone/live_surface.h"
+#include "osteo/haptics/servo.h"
+#include "osteo/rt/loop.h"
+#include "osteo/session/recorder.h"
+
+namespace osteo {
+
+struct RehearsalOptions {
+  double rate_hz = 1000;
+  ContactParams contact;
+  std::filesystem::path session_file;  ///< empty: not recorded
+  bool follow_surface = true;
+};
+
+struct RehearsalSummary {
+  std::uint64_t ticks = 0;
+  double removed_mm3 = 0;
+  std::string bone_hash, surface_hash;
+  std::uint64_t dropped = 0;       ///< ticks that a reader lost
+  std::uint64_t session_bytes = 0;
+  std::optional<LoopStats> loop;   ///< only when it ran by the clock
+};
+
+/// Owns the bone while it runs. The servo thread writes it; the recorder, the surface follower and whoever asks for a
+/// reader are told through the stream.
+class Rehearsal {
+ public:
+  Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
+  ~Rehearsal();
+
+  /// By the clock, in threads of its own.
+  void start();
+  [[nodiscard]] bool running() const;
+  /// Ends the threads, takes the rest of the stream, closes the session file. Error(cannot_write) when it could not be
+  /// recorded to the end.
+  RehearsalSummary stop();
+
+  /// As fast as possible in this thread, up to the device's end. Same bone, surface and session as by the clock.
+  RehearsalSummary run_to_end(const Context& context);
+
+  /// Latest tick, for display.
+  [[nodiscard]] TickRecord latest() const { return latest_.load(); }
+  [[nodiscard]] double removed_mm3() const;
+  [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
+  [[nodiscard]] const BrickGrid& bone() const { return bone_; }
+  [[nodiscard]] Device& device() { return *device_; }
+  /// Calls f(surface, bricks changed since the last call) under the lock that keeps the follower away.
+  void with_surface(const std::function<void(const LiveSurface&, std::span<const std::uint32_t>)>& f);
+
+ private:
+  void follow();
+  std::size_t drain_surface();
+  RehearsalSummary finish();
+
+  BrickGrid bone_;
+  std::unique_ptr<Device> device_;
+  RehearsalOptions options_;
+  VolumeSampling model_;
+  Stream stream_;
+  std::unique_ptr<Recorder> recorder_;
+  StreamReader* surface_reader_ = nullptr;
+  Servo servo_;
+  Seqlock<TickRecord> latest_;
+  std::atomic<double> removed_mm3_{0};
+  std::unique_ptr<FixedRateLoop> loop_;
+  std::mutex surface_mutex_;
+  std::unique_ptr<LiveSurface> surface_;
+  std::set<std::uint32_t> changed_bricks_;
+  std::vector<TickRecord> tick_buffer_;
+  std::vector<VoxelChange> change_buffer_;
+  std::atomic<bool> stop_{false};
+  std::thread follower_;
+};
+
+/// What a replay found.
+struct ReplayResult {
+  std::uint64_t ticks = 0;
+  bool complete = false;      ///< the session was closed properly
+  bool identical = false;     ///< every tick, and (when complete) bone and surface, came out bit for bit the same
+  std::string difference;     ///< the first one
+  std::string bone_hash, surface_hash;
+  double removed_mm3 = 0;
+  double seconds = 0;
+};
+
+/// Runs the recorded poses through the same servo on `bone`, which is left as the session left it.
+/// Error(corrupt) when the session belongs to another bone.
+[[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, const Context& context);
+
+/// A drilling that fits any head: from the middle of the bone outwards to the patient's left (or right) until the outside is
+/// reached, there a cavity in circles of growing radius and depth. Error(failed) when no bone is met.
+[[nodiscard]] Script make_default_script(const BrickGrid& bone, bool left, int tool, double seconds);
+
+}  // namespace osteo

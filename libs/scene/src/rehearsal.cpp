@@ -1,0 +1,232 @@
+#include "osteo/scene/rehearsal.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "osteo/base/error.h"
+#include "osteo/pipeline/pipeline.h"
+
+namespace osteo {
+
+Rehearsal::Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context)
+    : bone_(std::move(bone)), device_(std::move(device)), options_(options), model_(options.contact),
+      servo_(bone_, model_, *device_, stream_, options.rate_hz), tick_buffer_(1024), change_buffer_(1 << 20) {
+  if (!options_.session_file.empty()) {
+    SessionHeader header;
+    header.program_version = program_version();
+    header.bone_hash = bone_.hash();
+    header.rate_hz = options_.rate_hz;
+    header.contact = options_.contact;
+    recorder_ = std::make_unique<Recorder>(stream_.add_reader(), options_.session_file, header);
+  }
+  if (options_.follow_surface) {
+    surface_ = std::make_unique<LiveSurface>(bone_, context);
+    surface_reader_ = &stream_.add_reader();
+  }
+}
+
+Rehearsal::~Rehearsal() {
+  if (loop_) loop_->request_stop();
+  if (loop_) loop_->join();
+  stop_ = true;
+  if (follower_.joinable()) follower_.join();
+}
+
+double Rehearsal::removed_mm3() const { return removed_mm3_; }
+bool Rehearsal::running() const { return loop_ && loop_->running(); }
+
+std::size_t Rehearsal::drain_surface() {
+  if (surface_reader_ == nullptr) return 0;
+  std::size_t total = 0;
+  const std::lock_guard lock(surface_mutex_);
+  while (const std::size_t n = surface_reader_->ticks.pop(tick_buffer_)) {
+    std::size_t wanted = 0;
+    double removed = 0;
+    for (std::size_t t = 0; t < n; ++t) {
+      wanted += tick_buffer_[t].voxels_changed;
+      removed += static_cast<double>(tick_buffer_[t].removed_mm3);
+    }
+    if (wanted > change_buffer_.size()) change_buffer_.resize(wanted);
+    const std::size_t got = surface_reader_->changes.pop({change_buffer_.data(), wanted});
+    for (std::size_t c = 0; c < got; ++c) surface_->mark(change_buffer_[c].voxel);
+    removed_mm3_ = removed_mm3_ + removed;
+    latest_.store(tick_buffer_[n - 1]);
+    total += n;
+  }
+  for (const std::uint32_t b : surface_->update()) changed_bricks_.insert(b);
+  return total;
+}
+
+void Rehearsal::follow() {
+  while (!stop_) {
+    drain_surface();
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+void Rehearsal::start() {
+  loop_ = std::make_unique<FixedRateLoop>(options_.rate_hz, [this](std::int64_t lateness_ns) { return servo_.step(lateness_ns); });
+  if (recorder_) recorder_->start();
+  if (surface_) follower_ = std::thread([this] { follow(); });
+  loop_->start();
+}
+
+RehearsalSummary Rehearsal::stop() {
+  if (loop_) {
+    loop_->request_stop();
+    loop_->join();
+  }
+  stop_ = true;
+  if (follower_.joinable()) follower_.join();
+  return finish();
+}
+
+RehearsalSummary Rehearsal::run_to_end(const Context& context) {
+  while (servo_.step(0)) {
+    if (servo_.ticks() % 64 != 0) continue;
+    context.check_cancelled();
+    if (recorder_) recorder_->drain();
+    drain_surface();
+  }
+  return finish();
+}
+
+RehearsalSummary Rehearsal::finish() {
+  drain_surface();
+  if (recorder_) recorder_->stop();
+  RehearsalSummary s;
+  s.ticks = servo_.ticks();
+  s.removed_mm3 = recorder_ ? recorder_->removed_mm3() : removed_mm3_.load();
+  s.bone_hash = bone_.hash();
+  if (surface_) {
+    s.surface_hash = surface_hash(surface_->joined().mesh);
+    s.dropped = surface_reader_->dropped;
+  }
+  if (recorder_) {
+    if (recorder_->failure()) throw Error(*recorder_->failure());
+    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3});
+    s.session_bytes = recorder_->bytes();
+  }
+  if (loop_) s.loop = loop_->stats();
+  return s;
+}
+
+void Rehearsal::with_surface(const std::function<void(const LiveSurface&, std::span<const std::uint32_t>)>& f) {
+  const std::lock_guard lock(surface_mutex_);
+  const std::vector<std::uint32_t> changed(changed_bricks_.begin(), changed_bricks_.end());
+  changed_bricks_.clear();
+  f(*surface_, changed);
+}
+
+ReplayResult replay(const Session& session, BrickGrid& bone, const Context& context) {
+  const auto begin = std::chrono::steady_clock::now();
+  ReplayResult result;
+  if (bone.hash() != session.header.bone_hash) {
+    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's", "give the case it was recorded on, unchanged");
+  }
+  std::vector<DeviceSample> samples;
+  samples.reserve(session.ticks.size());
+  for (const TickRecord& t : session.ticks) samples.push_back(t.device);
+  BrickGrid from_changes = bone;  // the second way: apply the recorded changes
+  ReplayDevice device(std::move(samples));
+  VolumeSampling model(session.header.contact);
+  Stream stream;
+  StreamReader& reader = stream.add_reader();
+  Servo servo(bone, model, device, stream, session.header.rate_hz);
+  std::vector<VoxelChange> changes(1 << 16);
+  const auto differ = [&](const std::string& what) {
+    if (result.difference.empty()) result.difference = what;
+  };
+  for (const TickRecord& recorded : session.ticks) {
+    if (recorded.tick % 256 == 0) context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(session.ticks.size()), "replay");
+    servo.step(0);
+    TickRecord now;
+    reader.ticks.pop({&now, 1});
+    while (reader.changes.pop(changes) > 0) {
+    }
+    // Bytes, not numbers: the same bits or not.
+    const bool same = std::memcmp(&now.force_n, &recorded.force_n, sizeof now.force_n) == 0 && std::memcmp(&now.depth_mm, &recorded.depth_mm, sizeof now.depth_mm) == 0 &&
+                      std::memcmp(&now.removed_mm3, &recorded.removed_mm3, sizeof now.removed_mm3) == 0 && now.voxels_changed == recorded.voxels_changed &&
+                      now.immersed_samples == recorded.immersed_samples;
+    if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
+    result.removed_mm3 += static_cast<double>(now.removed_mm3);
+  }
+  result.ticks = session.ticks.size();
+  for (const VoxelChange& c : session.changes) {
+    if (c.voxel / BrickGrid::kVoxels >= from_changes.brick_count()) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    from_changes.set(c.voxel, c.density);
+  }
+  result.bone_hash = bone.hash();
+  if (from_changes.hash() != result.bone_hash) differ("the recorded voxel changes give another bone than the recorded poses");
+  result.surface_hash = surface_hash(surface_nets(bone, 0.5F, context).mesh);
+  result.complete = session.end.has_value();
+  if (session.end) {
+    if (session.end->ticks != result.ticks) differ("the session says it had " + std::to_string(session.end->ticks) + " ticks");
+    if (session.end->bone_hash != result.bone_hash) differ("the bone came out differently");
+    if (!session.end->surface_hash.empty() && session.end->surface_hash != result.surface_hash) differ("the surface came out differently");
+  }
+  result.identical = result.difference.empty();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+Script make_default_script(const BrickGrid& bone, bool left, int tool, double seconds) {
+  // Centre of the bone, from a brick's middle each: near enough for a starting point.
+  Vec3 sum{};
+  double weight = 0;
+  for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+    const Ijk o = bone.brick_coordinate(b);
+    sum += bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
+    weight += 1;
+  }
+  if (weight == 0) throw Error(ExitCode::failed, "the case holds no bone");
+  const Vec3 centre = sum / weight;
+  const Vec3 out{left ? 1.0 : -1.0, 0, 0};
+  const auto density_at = [&](Vec3 p) {
+    const Vec3 i = bone.frame().index_from_world(p);
+    return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5)));
+  };
+  // The outside of the first bone met that is followed by 5 mm of nothing; try rays around the centre until one meets bone.
+  std::optional<Vec3> entry;
+  const auto& f = bone.frame();
+  const double longest = length({f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z});
+  for (int ring = 0; ring < 40 && !entry; ++ring) {
+    for (int a = 0; a < (ring == 0 ? 1 : 8) && !entry; ++a) {
+      const double angle = a * std::numbers::pi / 4;
+      const Vec3 from = centre + Vec3{0, 2.0 * ring * std::cos(angle), 2.0 * ring * std::sin(angle)};
+      double bone_end = -1;
+      for (double s = 0; s < longest; s += 0.25) {
+        if (density_at(from + out * s) >= 0.5F) {
+          bone_end = s;
+        } else if (bone_end >= 0 && s - bone_end > 5) {
+          break;
+        }
+      }
+      if (bone_end >= 0) entry = from + out * bone_end;
+    }
+  }
+  if (!entry) throw Error(ExitCode::failed, "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side", "write a script of strokes for this case");
+
+  const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
+  Script script;
+  script.tool = tool;
+  script.axis = normalized(out + Vec3{0, 0.35, 0.35});
+  const Vec3 u{0, 1, 0}, v{0, 0, 1};
+  script.waypoints.push_back({0, *entry + out * (radius + 6), false});
+  script.waypoints.push_back({0.04 * seconds, *entry + out * (radius + 1), true});
+  const double first = 0.06 * seconds, last = 0.94 * seconds, step = 0.05;
+  for (double t = first; t < last; t += step) {
+    const double share = (t - first) / (last - first);
+    const double circle = (1 + 5 * std::sqrt(share)) * std::min(1.0, 0.4 + 0.1 * seconds), angle = 2 * std::numbers::pi * 1.2 * (t - first);
+    const double depth = 2 + 5 * share;
+    script.waypoints.push_back({t, *entry + out * (radius - depth) + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+  }
+  script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});
+  script.waypoints.push_back({seconds, *entry + out * (radius + 8), false});
+  return script;
+}
+
+}  // namespace osteo

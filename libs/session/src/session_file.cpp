@@ -1,0 +1,164 @@
+#include "osteo/session/session_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+static_assert(std::endian::native == std::endian::little, "session files are little endian");
+
+constexpr std::uint32_t kMagic = 0x3146534f;  // "OSF1"
+enum FrameType : std::uint32_t { kHeader = 1, kTicks = 2, kChanges = 3, kEnd = 4 };
+constexpr std::uint32_t kLongestFrame = 64U << 20;
+
+struct FrameHead {
+  std::uint32_t magic, type, bytes, crc;
+};
+
+std::uint32_t checksum(std::uint32_t type, std::span<const std::byte> payload) {
+  uLong crc = ::crc32(0, reinterpret_cast<const Bytef*>(&type), sizeof type);
+  crc = ::crc32(crc, reinterpret_cast<const Bytef*>(payload.data()), static_cast<uInt>(payload.size()));
+  return static_cast<std::uint32_t>(crc);
+}
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text.data(), text.size())); }
+
+template <class T>
+void append_records(std::vector<T>& out, std::span<const std::byte> payload) {
+  const std::size_t n = payload.size() / sizeof(T), before = out.size();
+  out.resize(before + n);
+  std::memcpy(out.data() + before, payload.data(), n * sizeof(T));
+}
+
+}  // namespace
+
+SessionWriter::SessionWriter(const fs::path& path, const SessionHeader& h) : path_(path) {
+  fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (fd_ < 0) {
+    throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(errno), errno == EEXIST ? "give another name" : "choose a folder that you may write to");
+  }
+  ordered_json j;
+  j["osteotome_session"] = 1;
+  j["program"] = h.program_version;
+  j["bone_hash"] = h.bone_hash;
+  j["rate_hz"] = h.rate_hz;
+  j["burr_library"] = h.burr_library;
+  j["tick_bytes"] = sizeof(TickRecord);
+  j["contact"] = {{"stiffness_n_per_mm", h.contact.stiffness_n_per_mm}, {"soft_stiffness_n_per_mm", h.contact.soft_stiffness_n_per_mm},
+                  {"soft_depth_mm", h.contact.soft_depth_mm}, {"max_force_n", h.contact.max_force_n}};
+  frame(kHeader, bytes_of(j.dump()));
+}
+
+SessionWriter::~SessionWriter() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+void SessionWriter::frame(std::uint32_t type, std::span<const std::byte> payload) {
+  const FrameHead head{kMagic, type, static_cast<std::uint32_t>(payload.size()), checksum(type, payload)};
+  std::vector<std::byte> all(sizeof head + payload.size());
+  std::memcpy(all.data(), &head, sizeof head);
+  std::memcpy(all.data() + sizeof head, payload.data(), payload.size());
+  std::size_t done = 0;
+  while (done < all.size()) {
+    const ssize_t n = ::write(fd_, all.data() + done, all.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw Error(ExitCode::cannot_write, "cannot write '" + path_.string() + "': " + std::strerror(errno), "what was recorded before can be replayed");
+    done += static_cast<std::size_t>(n);
+  }
+  bytes_ += all.size();
+}
+
+void SessionWriter::append(std::span<const TickRecord> ticks, std::span<const VoxelChange> changes) {
+  if (!ticks.empty()) frame(kTicks, std::as_bytes(ticks));
+  if (changes.empty()) return;
+  // The last change of each voxel is all a reader needs to follow block by block.
+  coalesced_.assign(changes.begin(), changes.end());
+  std::stable_sort(coalesced_.begin(), coalesced_.end(), [](const auto& a, const auto& b) { return a.voxel < b.voxel; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < coalesced_.size(); ++i) {
+    if (i + 1 < coalesced_.size() && coalesced_[i + 1].voxel == coalesced_[i].voxel) continue;
+    coalesced_[kept++] = coalesced_[i];
+  }
+  coalesced_.resize(kept);
+  frame(kChanges, std::as_bytes(std::span(coalesced_)));
+}
+
+void SessionWriter::sync() { ::fdatasync(fd_); }
+
+void SessionWriter::finish(const SessionEnd& e) {
+  ordered_json j;
+  j["ticks"] = e.ticks;
+  j["bone_hash"] = e.bone_hash;
+  j["surface_hash"] = e.surface_hash;
+  j["removed_mm3"] = e.removed_mm3;
+  frame(kEnd, bytes_of(j.dump()));
+  sync();
+}
+
+Session read_session(const fs::path& path) {
+  const auto bytes = read_file(path);
+  const std::string name = "'" + path.string() + "'";
+  Session session;
+  std::size_t at = 0;
+  bool first = true;
+  while (at + sizeof(FrameHead) <= bytes.size()) {
+    FrameHead head{};
+    std::memcpy(&head, bytes.data() + at, sizeof head);
+    const bool plausible = head.magic == kMagic && head.bytes <= kLongestFrame;
+    if (!plausible && first) throw Error(ExitCode::corrupt, name + " is not a session file");
+    const bool whole = plausible && at + sizeof head + head.bytes <= bytes.size();
+    const std::span payload = whole ? std::span(bytes).subspan(at + sizeof head, head.bytes) : std::span<const std::byte>();
+    if (!whole || checksum(head.type, payload) != head.crc) {
+      const bool last = !plausible || !whole || at + sizeof head + head.bytes == bytes.size();
+      if (!first && last) break;
+      throw Error(ExitCode::corrupt, name + " is damaged at byte " + std::to_string(at), "copy the file again from its source");
+    }
+    const std::string_view text(reinterpret_cast<const char*>(payload.data()), payload.size());
+    try {
+      if (first) {
+        const auto j = ordered_json::parse(text);
+        if (head.type != kHeader || j.at("osteotome_session") != 1) throw Error(ExitCode::corrupt, name + " is not a session of this program");
+        session.header.program_version = j.at("program");
+        session.header.bone_hash = j.at("bone_hash");
+        session.header.rate_hz = j.at("rate_hz");
+        session.header.burr_library = j.at("burr_library");
+        const auto& c = j.at("contact");
+        session.header.contact = {c.at("stiffness_n_per_mm"), c.at("soft_stiffness_n_per_mm"), c.at("soft_depth_mm"), c.at("max_force_n")};
+        if (j.at("tick_bytes") != sizeof(TickRecord) || session.header.burr_library != kBurrLibraryVersion) {
+          throw Error(ExitCode::corrupt, name + " was recorded by another version (" + session.header.program_version + ")", "replay it with that version");
+        }
+        first = false;
+      } else if (head.type == kTicks) {
+        append_records(session.ticks, payload);
+      } else if (head.type == kChanges) {
+        append_records(session.changes, payload);
+      } else if (head.type == kEnd) {
+        const auto j = ordered_json::parse(text);
+        session.end = SessionEnd{j.at("ticks"), j.at("bone_hash"), j.at("surface_hash"), j.at("removed_mm3")};
+      }
+    } catch (const nlohmann::json::exception& e) {
+      throw Error(ExitCode::corrupt, name + " has a damaged frame: " + e.what());
+    }
+    at += sizeof head + head.bytes;
+  }
+  if (first) throw Error(ExitCode::corrupt, name + " is not a session file, or was cut before its header ended");
+  for (std::size_t t = 0; t < session.ticks.size(); ++t) {
+    if (session.ticks[t].tick != t) throw Error(ExitCode::corrupt, name + ": tick " + std::to_string(t) + " is missing");
+  }
+  return session;
+}
+
+}  // namespace osteo
