@@ -15,6 +15,7 @@
 #include "osteo/io/surface_io.h"
 #include "osteo/scene/case.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/scene/session_folder.h"
 #include "osteo/session/script_file.h"
 #include "osteo/view/snapshot.h"
 
@@ -22,40 +23,6 @@ namespace osteo {
 namespace {
 
 using nlohmann::ordered_json;
-
-fs::path stream_path(const fs::path& session) { return fs::is_directory(session) ? session / "stream.oss" : session; }
-
-// CASE/sessions/1, 2, ...: the first that is free.
-fs::path new_session_folder(const fs::path& wanted, const fs::path& case_folder) {
-  std::error_code ec;
-  fs::path folder = wanted;
-  if (folder.empty()) {
-    for (int n = 1;; ++n) {
-      folder = case_folder / "sessions" / std::to_string(n);
-      if (!fs::exists(folder)) break;
-    }
-  } else if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder))) {
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already", "give another name for the session; a session is never overwritten");
-  }
-  fs::create_directories(folder, ec);
-  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message());
-  return folder;
-}
-
-ordered_json loop_json(const LoopStats& s) {
-  const auto quantiles = [](const Histogram& h) {
-    return ordered_json{{"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
-  };
-  ordered_json j;
-  j["work_us"] = quantiles(s.work);
-  j["wake_up_lateness_us"] = quantiles(s.lateness);
-  j["missed_by_work"] = s.missed_by_work;
-  j["missed_by_machine"] = s.missed_by_machine;
-  j["realtime_priority"] = s.realtime_granted;
-  if (!s.realtime_granted) j["realtime_refusal"] = s.realtime_refusal;
-  j["memory_locked"] = s.memory_locked;
-  return j;
-}
 
 // The window is a program of its own, so that servers need neither GLFW nor a display.
 int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
@@ -86,13 +53,10 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.headless) return open_window(p, io);
   const Case the_case = load_case(io.arguments[0]);
   io.context.progress(0, "loading");
-  BrickGrid bone = to_bricks(the_case.bone);
-  if (!p.resume.empty()) {
-    const ReplayResult r = replay(read_session(stream_path(p.resume)), bone, io.context.sub(0, 0.1));
-    if (!r.identical) throw Error(ExitCode::failed, "the session to resume from does not replay: " + r.difference);
-  }
+  BrickGrid bone = p.resume.empty() ? to_bricks(the_case.bone) : bone_at_end(open_session_folder(p.resume, the_case.folder));
   const Script script = p.script.empty() ? make_default_script(bone, p.side == Side::left, tool, p.seconds) : load_script(p.script);
-  const fs::path folder = new_session_folder(p.out, the_case.folder);
+  const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
+  const fs::path& folder = session.folder;
 
   // Before and after are seen from where the drill came, around the middle of its strokes.
   Vec3 site{};
@@ -108,8 +72,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
 
   RehearsalOptions options;
   options.rate_hz = p.rate_hz;
-  options.session_file = folder / "stream.oss";
-  const double volume_before = bone.sum() * bone.frame().voxel_volume_mm3();
+  options.session_file = session.stream();
   Rehearsal rehearsal(std::move(bone), std::make_unique<ScriptedDevice>(script, p.rate_hz), options, io.context);
   RehearsalSummary s;
   if (p.fast) {
@@ -131,23 +94,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const TriMesh after = draw(rehearsal.bone(), "after.png");
   save_surface(after, folder / "surface.ply");
 
-  ordered_json j;
-  j["osteotome_session_summary"] = 1;
-  j["case"] = fs::proximate(fs::absolute(the_case.folder), fs::absolute(folder)).string();
-  j["ticks"] = s.ticks;
-  j["rate_hz"] = p.rate_hz;
-  j["burr"] = burr_library()[static_cast<std::size_t>(script.tool)].name();
-  j["removed_mm3"] = s.removed_mm3;
-  j["bone_mm3_before"] = volume_before;
-  j["bone_mm3_after"] = rehearsal.bone().sum() * rehearsal.bone().frame().voxel_volume_mm3();
-  j["bone_hash"] = s.bone_hash;
-  j["surface_hash"] = s.surface_hash;
-  j["session_bytes"] = s.session_bytes;
-  j["ticks_lost_by_readers"] = s.dropped;
-  if (!p.resume.empty()) j["resumed_from"] = fs::proximate(fs::absolute(p.resume), fs::absolute(folder)).string();
-  if (s.loop) j["loop"] = loop_json(*s.loop);
-  write_file(folder / "summary.json", j.dump(2) + "\n");
-
+  const std::string summary = write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name());
   io.end_progress();
   if (!io.common.quiet) {
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
@@ -159,7 +106,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     }
     io.err << "session: " << folder.string() << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay " << folder.string() << '\n';
   }
-  if (io.common.json) io.out << j.dump(2) << '\n';
+  if (io.common.json) io.out << summary;
   return 0;
 }
 
@@ -167,30 +114,13 @@ cli::CommandInfo ReplayCommand::info() {
   return {"replay", "run a session again and prove that it comes out the same",
           "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; also applies the recorded "
           "voxel changes and compares that. Exit code 7 when anything differs.",
-          {{"session", "a session folder, or its stream.oss"}}, "osteo replay SESSION"};
+          {{"session", "a session folder"}}, "osteo replay SESSION"};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
-  const fs::path session_path = io.arguments[0];
-  require_readable(session_path);
-  const Session session = read_session(stream_path(session_path));
-  fs::path case_folder = p.case_folder;
-  fs::path resumed_from;
-  const fs::path summary = session_path / "summary.json";
-  if (fs::is_directory(session_path) && fs::exists(summary)) {
-    const auto j = ordered_json::parse(read_text(summary), nullptr, false);
-    if (case_folder.empty() && j.contains("case")) case_folder = session_path / j["case"].get<std::string>();
-    if (j.contains("resumed_from")) resumed_from = session_path / j["resumed_from"].get<std::string>();
-  }
-  // A session in CASE/sessions/N that was cut before its summary was written.
-  if (case_folder.empty() && fs::exists(session_path / "../../manifest.json")) case_folder = session_path / "../..";
-  if (case_folder.empty()) throw Error(ExitCode::usage, "which case was it recorded on?", "--case-folder CASE");
-  const Case the_case = load_case(case_folder);
-  BrickGrid bone = to_bricks(the_case.bone);
-  if (!resumed_from.empty()) {
-    const ReplayResult before = replay(read_session(stream_path(resumed_from)), bone, io.context);
-    if (!before.identical) throw Error(ExitCode::failed, "the session that this one goes on from differs: " + before.difference);
-  }
+  const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
+  const Session session = read_session(folder.stream());
+  BrickGrid bone = bone_at_begin(folder);
   const ReplayResult r = replay(session, bone, io.context);
   if (!p.surface_out.empty()) {
     if (fs::exists(p.surface_out) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");

@@ -109,21 +109,20 @@ bool skull_tissue(Vec3 p, Tissue& tissue) {
   return false;
 }
 
+// Distance in the axial plane from an ellipse around (0, y0), to first order.
+double arch_distance(Vec3 p, double rx, double y0, double ry) {
+  const double u = p.x / rx, v = (p.y - y0) / ry, f = std::hypot(u, v);
+  const double slope = std::hypot(u / rx, v / ry) / std::max(f, 1e-9);
+  return std::abs(f - 1) / std::max(slope, 1e-9);
+}
+
 bool jaw_tissue(Vec3 p, Tissue& tissue) {
   // Body: a half ellipse open to the back; rami rise from its ends to below the skull base.
-  const double angle = std::atan2(-(p.y + 5), p.x);
-  if (angle > 0 && angle < std::numbers::pi) {
-    const Vec3 on{46 * std::cos(angle), -5 - 75 * std::sin(angle), p.z};
-    if (p.z > -92 && p.z < -66 && length(p - on) < 5.5) return tissue = Tissue::mandible, true;
-  }
+  if (p.y < 0 && p.z > -92 && p.z < -66 && arch_distance(p, 46, -5, 75) < 5.5) return tissue = Tissue::mandible, true;
   const double side = p.x > 0 ? 46 : -46;
   if (std::abs(p.x - side) < 4 && p.y > -12 && p.y < 12 && p.z > -92 && p.z < -48) return tissue = Tissue::mandible, true;
   // Upper jaw: a block of bone under the nose that carries the teeth.
-  const double upper = std::atan2(-(p.y + 25), p.x);
-  if (upper > 0 && upper < std::numbers::pi && p.z > -62 && p.z < -38) {
-    const Vec3 on{34 * std::cos(upper), -25 - 52 * std::sin(upper), p.z};
-    if (length(p - on) < 7) return tissue = Tissue::cortical, true;
-  }
+  if (p.y < -25 && p.z > -62 && p.z < -38 && arch_distance(p, 34, -25, 52) < 7) return tissue = Tissue::cortical, true;
   return false;
 }
 
@@ -138,6 +137,24 @@ double gaussian(std::uint64_t seed, std::uint64_t voxel) {
   const std::uint64_t a = mix(seed * 0x632be59bd9b4e019ULL + voxel), b = mix(a);
   const double u = (static_cast<double>(a >> 11) + 0.5) * 0x1p-53, v = (static_cast<double>(b >> 11) + 0.5) * 0x1p-53;
   return std::sqrt(-2 * std::log(u)) * std::cos(2 * std::numbers::pi * v);
+}
+
+void spread(std::vector<float>& v, const Frame& frame, std::size_t axis, int threads) {
+  const auto nx = static_cast<std::size_t>(frame.dims[0]), ny = static_cast<std::size_t>(frame.dims[1]);
+  const std::size_t stride = axis == 0 ? 1 : axis == 1 ? nx : nx * ny;
+  const auto n = static_cast<std::size_t>(frame.dims[axis]);
+  const std::size_t lines = v.size() / n;
+  parallel_for(lines, 256, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t l = begin; l < end; ++l) {
+      float* const p = v.data() + (axis == 0 ? l * nx : axis == 1 ? (l / nx) * nx * ny + l % nx : l);
+      float before = p[0];
+      for (std::size_t i = 0; i < n; ++i) {
+        const float here = p[i * stride], after = p[std::min(i + 1, n - 1) * stride];
+        p[i * stride] = (before + 4 * here + after) / 6;
+        before = here;
+      }
+    }
+  });
 }
 
 Frame phantom_frame(const PhantomParams& p) {
@@ -181,6 +198,7 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   const int nx = frame.dims[0], ny = frame.dims[1], nz = frame.dims[2];
   const auto hu = make_voxels<std::int16_t>(frame.voxel_count());
   const auto labels = make_voxels<std::uint8_t>(frame.voxel_count());
+  std::vector<float> means(frame.voxel_count());
   std::vector<double> bone_samples(static_cast<std::size_t>(nz));
   std::atomic<int> slices_done{0};
   parallel_for(static_cast<std::size_t>(nz), 1, context.threads, [&](std::size_t zb, std::size_t) {
@@ -219,12 +237,19 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
           }
         }
         bone += share;
-        const double noise = p.noise_hu > 0 ? p.noise_hu * gaussian(static_cast<std::uint64_t>(p.seed), at) : 0;
-        hu[at] = static_cast<std::int16_t>(std::clamp(std::lround(mean + noise), -1024L, 3071L));
+        means[at] = static_cast<float>(mean);
       }
     }
     bone_samples[zb] = bone;
-    context.progress(static_cast<double>(++slices_done) / nz, "phantom");
+    context.progress(0.8 * ++slices_done / nz, "phantom");
+  });
+  // The scanner: its point spread (1 4 1)/6 along each axis, then noise.
+  for (std::size_t axis = 0; axis < 3; ++axis) spread(means, frame, axis, context.threads);
+  parallel_for(means.size(), 1 << 16, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t at = begin; at < end; ++at) {
+      const double noise = p.noise_hu > 0 ? p.noise_hu * gaussian(static_cast<std::uint64_t>(p.seed), at) : 0;
+      hu[at] = static_cast<std::int16_t>(std::clamp(std::lround(static_cast<double>(means[at]) + noise), -1024L, 3071L));
+    }
   });
   Phantom result{{frame, hu}, {frame, labels}, 0};
   for (const double b : bone_samples) result.bone_mm3 += b * frame.voxel_volume_mm3();

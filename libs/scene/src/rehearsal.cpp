@@ -183,7 +183,8 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
     weight += 1;
   }
   if (weight == 0) throw Error(ExitCode::failed, "the case holds no bone");
-  const Vec3 centre = sum / weight;
+  // The mastoid of most heads lies behind and below the middle of their bone.
+  const Vec3 centre = sum / weight + Vec3{0, 20, -22};
   const Vec3 out{left ? 1.0 : -1.0, 0, 0};
   const auto density_at = [&](Vec3 p) {
     const Vec3 i = bone.frame().index_from_world(p);
@@ -213,15 +214,17 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
   const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
   Script script;
   script.tool = tool;
-  script.axis = normalized(out + Vec3{0, 0.35, 0.35});
+  script.axis = normalized(out + Vec3{0, 0.8, 0.6});
   const Vec3 u{0, 1, 0}, v{0, 0, 1};
   script.waypoints.push_back({0, *entry + out * (radius + 6), false});
   script.waypoints.push_back({0.04 * seconds, *entry + out * (radius + 1), true});
   const double first = 0.06 * seconds, last = 0.94 * seconds, step = 0.05;
   for (double t = first; t < last; t += step) {
     const double share = (t - first) / (last - first);
-    const double circle = (1 + 5 * std::sqrt(share)) * std::min(1.0, 0.4 + 0.1 * seconds), angle = 2 * std::numbers::pi * 1.2 * (t - first);
-    const double depth = 2 + 5 * share;
+    // Turns that open and close between the middle and the rim, a little deeper each time.
+    const double rim = std::min(7.0, 3 + seconds / 15), sway = std::abs(std::fmod(0.25 * (t - first), 2.0) - 1);
+    const double circle = rim * (1 - sway), angle = 2 * std::numbers::pi * 1.2 * (t - first);
+    const double depth = 3 + std::min(9.0, 0.12 * seconds + 1) * share;
     script.waypoints.push_back({t, *entry + out * (radius - depth) + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
   }
   script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});

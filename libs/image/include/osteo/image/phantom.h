@@ -51,7 +51,7 @@ struct PhantomParams {
 };
 
 struct Phantom {
-  Image ct;            ///< mean HU over the voxel (27 samples where tissues meet), plus Gaussian noise
+  Image ct;            ///< mean HU over the voxel, the scanner's point spread (1 4 1)/6 along each axis, Gaussian noise
   Labels labels;       ///< exact tissue at the voxel centre
   double bone_mm3 = 0;  ///< by the same 27 samples a voxel
 };

@@ -96,8 +96,8 @@ struct ReplayResult {
 /// Error(corrupt) when the session belongs to another bone.
 [[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, const Context& context);
 
-/// A drilling that fits any head: from the middle of the bone outwards to the patient's left (or right) until the outside is
-/// reached, there a cavity in circles of growing radius and depth. Error(failed) when no bone is met.
+/// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
+/// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
 [[nodiscard]] Script make_default_script(const BrickGrid& bone, bool left, int tool, double seconds);
 
 }  // namespace osteo

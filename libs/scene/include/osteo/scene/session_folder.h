@@ -1,0 +1,35 @@
+// A session on disk: its stream, what it was recorded on, and what came of it.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "osteo/scene/case.h"
+#include "osteo/scene/rehearsal.h"
+
+namespace osteo {
+
+struct SessionFolder {
+  std::filesystem::path folder;
+  std::filesystem::path case_folder;
+  std::filesystem::path resumed_from;  ///< the session whose end is this one's beginning, or empty
+
+  [[nodiscard]] std::filesystem::path stream() const { return folder / "stream.oss"; }
+  [[nodiscard]] std::filesystem::path summary() const { return folder / "summary.json"; }
+};
+
+/// Makes a new, empty folder: `wanted`, or when that is empty CASE/sessions/N with the first free N. Writes session.json,
+/// which ties it to the case by relative paths. Error(cannot_write) when `wanted` holds something.
+[[nodiscard]] SessionFolder create_session_folder(const std::filesystem::path& wanted, const std::filesystem::path& case_folder, const std::filesystem::path& resumed_from);
+
+/// Errors: no_input, corrupt. `case_folder` overrides what the session says when it is not empty.
+[[nodiscard]] SessionFolder open_session_folder(const std::filesystem::path& folder, const std::filesystem::path& case_folder = {});
+
+/// The bone at the beginning of a session: the case's, drilled by the sessions it goes on from (their recorded changes).
+[[nodiscard]] BrickGrid bone_at_begin(const SessionFolder& session);
+/// The bone at the end of a session.
+[[nodiscard]] BrickGrid bone_at_end(const SessionFolder& session);
+
+/// Writes summary.json and returns its text.
+std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr);
+
+}  // namespace osteo

@@ -1,0 +1,102 @@
+#include "osteo/scene/session_folder.h"
+
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string relative_to(const fs::path& target, const fs::path& folder) { return fs::proximate(fs::absolute(target), fs::absolute(folder)).string(); }
+
+ordered_json quantiles(const Histogram& h) {
+  return {{"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
+}
+
+}  // namespace
+
+SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case_folder, const fs::path& resumed_from) {
+  SessionFolder s{wanted, case_folder, resumed_from};
+  if (wanted.empty()) {
+    for (int n = 1;; ++n) {
+      s.folder = case_folder / "sessions" / std::to_string(n);
+      if (!fs::exists(s.folder)) break;
+    }
+  } else if (fs::exists(wanted) && !(fs::is_directory(wanted) && fs::is_empty(wanted))) {
+    throw Error(ExitCode::cannot_write, "'" + wanted.string() + "' exists already", "give another name; a session is never overwritten");
+  }
+  std::error_code ec;
+  fs::create_directories(s.folder, ec);
+  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + s.folder.string() + "': " + ec.message(), "choose a folder that you may write to");
+  ordered_json j{{"osteotome_session_folder", 1}, {"case", relative_to(case_folder, s.folder)}};
+  if (!resumed_from.empty()) j["resumed_from"] = relative_to(resumed_from, s.folder);
+  write_file(s.folder / "session.json", j.dump(2) + "\n");
+  return s;
+}
+
+SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_folder) {
+  require_readable(folder);
+  const fs::path file = folder / "session.json";
+  if (!fs::exists(file)) throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
+  SessionFolder s{folder, case_folder, {}};
+  try {
+    const auto j = ordered_json::parse(read_text(file));
+    if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
+    if (j.contains("resumed_from")) s.resumed_from = folder / j["resumed_from"].get<std::string>();
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + e.what());
+  }
+  return s;
+}
+
+BrickGrid bone_at_begin(const SessionFolder& session) {
+  if (!session.resumed_from.empty()) return bone_at_end(open_session_folder(session.resumed_from, session.case_folder));
+  return to_bricks(load_case(session.case_folder).bone);
+}
+
+BrickGrid bone_at_end(const SessionFolder& session) {
+  BrickGrid bone = bone_at_begin(session);
+  const Session recorded = read_session(session.stream());
+  if (bone.hash() != recorded.header.bone_hash) {
+    throw Error(ExitCode::corrupt, "the session '" + session.folder.string() + "' was recorded on another bone than its case holds now", "give the case it was recorded on, unchanged");
+  }
+  for (const VoxelChange& c : recorded.changes) {
+    if (c.voxel / BrickGrid::kVoxels >= bone.brick_count()) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    bone.set(c.voxel, c.density);
+  }
+  if (recorded.end && bone.hash() != recorded.end->bone_hash) {
+    throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
+  }
+  return bone;
+}
+
+std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr) {
+  ordered_json j;
+  j["osteotome_session_summary"] = 1;
+  j["ticks"] = s.ticks;
+  j["rate_hz"] = rate_hz;
+  j["burr"] = burr;
+  j["removed_mm3"] = s.removed_mm3;
+  j["bone_hash"] = s.bone_hash;
+  j["surface_hash"] = s.surface_hash;
+  j["session_bytes"] = s.session_bytes;
+  j["ticks_lost_by_readers"] = s.dropped;
+  if (s.loop) {
+    const LoopStats& l = *s.loop;
+    j["loop"] = {{"work_us", quantiles(l.work)},
+                 {"wake_up_lateness_us", quantiles(l.lateness)},
+                 {"missed_by_work", l.missed_by_work},
+                 {"missed_by_machine", l.missed_by_machine},
+                 {"realtime_priority", l.realtime_granted},
+                 {"realtime_refusal", l.realtime_refusal},
+                 {"memory_locked", l.memory_locked}};
+  }
+  const std::string text = j.dump(2) + "\n";
+  write_file(session.summary(), text);
+  return text;
+}
+
+}  // namespace osteo
