@@ -190,7 +190,7 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
     const Vec3 i = bone.frame().index_from_world(p);
     return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5)));
   };
-  // The outside of the first bone met that is followed by 5 mm of nothing; try rays around the centre until one meets bone.
+  // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a head holder are narrower and wider); try rays around the centre until one meets bone.
   std::optional<Vec3> entry;
   const auto& f = bone.frame();
   const double longest = length({f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z});
@@ -202,7 +202,7 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
       for (double s = 0; s < longest; s += 0.25) {
         if (density_at(from + out * s) >= 0.5F) {
           bone_end = s;
-        } else if (bone_end >= 0 && s - bone_end > 5) {
+        } else if (bone_end >= 0 && s - bone_end > 20) {
           break;
         }
       }

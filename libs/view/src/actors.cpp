@@ -34,9 +34,10 @@ void set_up_scene(vtkRenderer* renderer) {
   renderer->AutomaticLightCreationOff();
   renderer->RemoveAllLights();
   vtkNew<vtkLightKit> lights;
-  lights->SetKeyLightIntensity(0.85);
-  lights->SetKeyToFillRatio(2.5);
-  lights->SetKeyToHeadRatio(2.5);
+  lights->SetKeyLightIntensity(0.8);
+  lights->SetKeyToFillRatio(2.2);
+  lights->SetKeyToHeadRatio(1.6);
+  lights->SetKeyLightAngle(35, -25);
   lights->AddLightsToRenderer(renderer);
 }
 

@@ -1,0 +1,573 @@
+#include "osteo/window/rehearsal_window.h"
+
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <vtkActor.h>
+#include <vtkCamera.h>
+#include <vtkCylinderSource.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkOpenGLState.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtkRenderer.h>
+#include <vtkSphereSource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "osteo/base/error.h"
+#include "osteo/grid/sampler.h"
+#include "osteo/io/surface_io.h"
+#include "osteo/view/actors.h"
+#include "osteo/view/bone_view.h"
+#include "osteo/view/offscreen.h"
+#include "osteo/view/slices.h"
+
+namespace osteo {
+namespace {
+
+constexpr int kPanelWidth = 270, kSliceWidth = 290;
+constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
+constexpr double kDisplayForceN = 4;  // full length of the force bar
+
+class RehearsalWindow {
+ public:
+  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions) : actions_(actions), tool_(options.tool) {
+    if (hu != nullptr) hu_.emplace(*hu);
+    open(options);
+    make_scene();
+    new_bone();
+    look_from(kFromLeft);
+    park_drill();
+  }
+
+  ~RehearsalWindow() {
+    glfwMakeContextCurrent(window_);
+    glDeleteTextures(3, textures_.data());
+    bone_view_.reset();
+    render_window_->Finalize();
+    ImGui_ImplOpenGL3_Shutdown();
+    ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+    glfwDestroyWindow(window_);
+    glfwTerminate();
+  }
+  RehearsalWindow(const RehearsalWindow&) = delete;
+  RehearsalWindow& operator=(const RehearsalWindow&) = delete;
+
+  int run() {
+    while (glfwWindowShouldClose(window_) == 0 && !quit_) frame();
+    return gl_errors_;
+  }
+
+ private:
+  // --- set-up -----------------------------------------------------------------------------------------------------
+
+  void open(const WindowOptions& options) {
+    static std::string reason;
+    glfwSetErrorCallback([](int, const char* text) { reason = text; });
+    if (glfwInit() == GLFW_FALSE) throw Error(ExitCode::failed, "no window can be opened: " + reason, "is there a display? Without one: osteo rehearse CASE --headless");
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    window_ = glfwCreateWindow(options.width, options.height, options.title.c_str(), nullptr, nullptr);
+    if (window_ == nullptr) {
+      glfwTerminate();
+      throw Error(ExitCode::failed, "no window can be opened: " + reason, "OpenGL 3.2 is needed");
+    }
+    glfwMakeContextCurrent(window_);
+    glfwSwapInterval(1);
+
+    render_window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
+    render_window_->SetOwnContext(0);
+    render_window_->SetIsCurrent(true);
+    render_window_->SetReadyForRendering(true);
+    render_window_->SetMultiSamples(0);
+    render_window_->OpenGLInitContext();
+    render_window_->SetFrameBlitModeToBlitToCurrent();
+    render_window_->AddRenderer(renderer_);
+
+    // Keys are queued by a callback, which ImGui chains behind its own: at few pictures a second a short press begins and
+    // ends between two frames, and asking for the state of a key would miss it.
+    glfwSetWindowUserPointer(window_, this);
+    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
+      auto* const self = static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w));
+      if (action != GLFW_RELEASE) self->pressed_keys_.push_back({key, action == GLFW_REPEAT});
+    });
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;
+    ImGui::StyleColorsDark();
+    ImGui::GetStyle().WindowRounding = 0;
+    ImGui_ImplGlfw_InitForOpenGL(window_, true);
+    ImGui_ImplOpenGL3_Init("#version 150");
+    glGenTextures(3, textures_.data());
+    for (const GLuint t : textures_) {
+      glBindTexture(GL_TEXTURE_2D, t);
+      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    }
+  }
+
+  void make_scene() {
+    set_up_scene(renderer_);
+    burr_source_->SetThetaResolution(24);
+    burr_source_->SetPhiResolution(24);
+    shaft_source_->SetResolution(20);
+    shaft_source_->SetHeight(70);
+    shaft_source_->SetCenter(0, 35, 0);  // vtk's cylinder lies along y: y is the tool's axis
+    for (auto [actor, source] : {std::pair<vtkActor*, vtkPolyDataAlgorithm*>{burr_, burr_source_}, {shaft_, shaft_source_}}) {
+      vtkNew<vtkPolyDataMapper> mapper;
+      mapper->SetInputConnection(source->GetOutputPort());
+      actor->SetMapper(mapper);
+      actor->SetUserMatrix(tool_matrix_);
+      renderer_->AddActor(actor);
+    }
+    burr_->GetProperty()->SetColor(0.75, 0.72, 0.62);
+    burr_->GetProperty()->SetSpecular(0.6);
+    burr_->GetProperty()->SetSpecularPower(40);
+    shaft_->GetProperty()->SetColor(0.62, 0.66, 0.72);
+    shaft_->GetProperty()->SetSpecular(0.5);
+    set_tool(tool_);
+  }
+
+  // The running rehearsal has another bone: show it.
+  void new_bone() {
+    if (!bone_view_) bone_view_ = std::make_unique<BoneView>(renderer_);
+    actions_.rehearsal().with_surface([&](const LiveSurface& surface, std::span<const std::uint32_t>) { bone_view_->show(surface); });
+    const BrickGrid& bone = actions_.rehearsal().bone();
+    Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+      const Ijk o = bone.brick_coordinate(b);
+      const Vec3 p = bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], p[a]);
+        hi[a] = std::max(hi[a], p[a]);
+      }
+    }
+    centre_ = (lo + hi) * 0.5;
+    radius_ = std::max(5.0, 0.5 * length(hi - lo));
+    slices_age_ = 1e9;
+  }
+
+  void look_from(Vec3 eye) { look_at(renderer_, centre_, 0.8 * radius_, normalized(eye)); }
+
+  // In front of the bone as seen now, drill off.
+  void park_drill() {
+    const Vec3 towards = view_direction() * -1;
+    goal_ = {centre_ + towards * radius_, {}, 0, static_cast<std::uint8_t>(tool_)};
+    send_goal();
+  }
+
+  // --- the hand ---------------------------------------------------------------------------------------------------
+
+  [[nodiscard]] Vec3 view_direction() const {
+    double d[3];
+    renderer_->GetActiveCamera()->GetDirectionOfProjection(d);
+    return {d[0], d[1], d[2]};
+  }
+
+  void send_goal() {
+    const Vec3 forward = view_direction();
+    double up[3];
+    renderer_->GetActiveCamera()->GetViewUp(up);
+    const Vec3 right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
+    const Vec3 axis = normalized(right * 0.62 + above * 0.45 - forward * 0.64);
+    goal_.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
+    goal_.tool = static_cast<std::uint8_t>(tool_);
+    goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
+    static_cast<MouseDevice&>(actions_.rehearsal().device()).set_goal(goal_);
+  }
+
+  void set_tool(int tool) {
+    tool_ = tool;
+    const double d = burr_library()[static_cast<std::size_t>(tool)].diameter_mm;
+    burr_source_->SetRadius(d / 2);
+    shaft_source_->SetRadius(std::min(1.2, 0.35 * d));
+  }
+
+  // World point under a window position at the depth of `reference` along the view.
+  [[nodiscard]] Vec3 unproject(double x, double y, Vec3 reference) {
+    renderer_->SetWorldPoint(reference.x, reference.y, reference.z, 1);
+    renderer_->WorldToDisplay();
+    const double depth = renderer_->GetDisplayPoint()[2];
+    renderer_->SetDisplayPoint(x, height_ - 1 - y, depth);
+    renderer_->DisplayToWorld();
+    const double* const w = renderer_->GetWorldPoint();
+    return {w[0] / w[3], w[1] / w[3], w[2] / w[3]};
+  }
+
+  // The bone under the mouse: a ray through the live voxels.
+  [[nodiscard]] std::optional<Vec3> bone_under(double x, double y) {
+    double position[3];
+    renderer_->GetActiveCamera()->GetPosition(position);
+    const Vec3 from{position[0], position[1], position[2]};
+    const Vec3 ray = normalized(unproject(x, y, centre_) - from);
+    const BrickGrid& bone = actions_.rehearsal().bone();
+    const double far = length(centre_ - from) + 2 * radius_, step = bone.frame().spacing_mm.x / 2;
+    for (double s = std::max(0.0, length(centre_ - from) - 2 * radius_); s < far; s += step) {
+      const Vec3 i = bone.frame().index_from_world(from + ray * s);
+      if (bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5))) >= 0.5F) return from + ray * s;
+    }
+    return std::nullopt;
+  }
+
+  void bring_drill_to_bone(double x, double y) {
+    const auto hit = bone_under(x, y);
+    if (!hit) {
+      say("no bone under the mouse");
+      return;
+    }
+    const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
+    goal_.position_mm = *hit - view_direction() * (r + 1);
+    say("drill brought to the bone");
+  }
+
+  // --- one frame --------------------------------------------------------------------------------------------------
+
+  void frame() {
+    glfwPollEvents();
+    glfwGetFramebufferSize(window_, &width_, &height_);
+    if (width_ < 200 || height_ < 150) return;
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+    mouse_and_keys();
+    panel();
+    slices();
+    if (show_help_) help();
+    ImGui::Render();
+
+    Rehearsal& rehearsal = actions_.rehearsal();
+    rehearsal.with_surface([&](const LiveSurface& surface, std::span<const std::uint32_t> changed) { bone_view_->update(surface, changed); });
+    const TickRecord tick = rehearsal.latest();
+    place_tool(tick);
+
+    render_window_->SetSize(width_, height_);
+    const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
+    renderer_->SetViewport(left, 0, right, 1);
+    renderer_->ResetCameraClippingRange();
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glClearColor(0.05F, 0.06F, 0.08F, 1);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    render_window_->GetState()->Reset();
+    render_window_->Render();
+    // VTK leaves its state for itself; ImGui saves and restores what it touches.
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    if (screenshot_wanted_) save_screenshot();
+    for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
+    glfwSwapBuffers(window_);
+  }
+
+  void place_tool(const TickRecord& tick) {
+    const Vec3 axis = normalized({tick.device.axis[0], tick.device.axis[1], tick.device.axis[2]});
+    const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
+    const Vec3 columns[3] = {v, axis, u};
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) tool_matrix_->SetElement(r, c, columns[c][static_cast<std::size_t>(r)]);
+    }
+    for (int r = 0; r < 3; ++r) tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[static_cast<std::size_t>(r)]));
+    tool_matrix_->Modified();
+    const bool on = tick.device.drill_on != 0;
+    burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
+  }
+
+  void mouse_and_keys() {
+    const ImGuiIO& io = ImGui::GetIO();
+    const ImVec2 m = io.MousePos;
+    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 && m.y < static_cast<float>(height_) && !show_help_;
+    vtkCamera* const camera = renderer_->GetActiveCamera();
+    if (in_view && !io.WantCaptureMouse) {
+      if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
+        camera->Azimuth(-0.35 * static_cast<double>(io.MouseDelta.x));
+        camera->Elevation(0.35 * static_cast<double>(io.MouseDelta.y));
+        camera->OrthogonalizeViewUp();
+      } else if (ImGui::IsMouseDragging(ImGuiMouseButton_Middle)) {
+        double f[3], p[3];
+        camera->GetFocalPoint(f);
+        camera->GetPosition(p);
+        const Vec3 focal{f[0], f[1], f[2]};
+        const Vec3 shift = unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), focal) - unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
+        camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
+        camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
+      } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+        goal_.position_mm += view_direction() * (0.05 * static_cast<double>(-io.MouseDelta.y));
+      } else if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) {
+        goal_.position_mm = unproject(static_cast<double>(m.x), static_cast<double>(m.y), goal_.position_mm);
+      }
+      if (io.MouseWheel != 0) {
+        if (io.KeyCtrl) {
+          camera->Dolly(std::pow(1.1, static_cast<double>(io.MouseWheel)));
+        } else {
+          goal_.position_mm += view_direction() * (0.5 * static_cast<double>(io.MouseWheel));
+        }
+      }
+    }
+    drill_held_ = in_view && !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    const std::vector<KeyPress> presses = std::exchange(pressed_keys_, {});
+    if (!io.WantTextInput) {
+      for (const KeyPress& k : presses) key(k, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
+    }
+    send_goal();
+  }
+
+  struct KeyPress {
+    int key;
+    bool repeated;
+  };
+
+  void key(KeyPress press, double x, double y, bool in_view) {
+    if (press.key == GLFW_KEY_DOWN) goal_.position_mm += view_direction() * 0.25;
+    if (press.key == GLFW_KEY_UP) goal_.position_mm -= view_direction() * 0.25;
+    if (press.repeated) return;
+    if (press.key >= GLFW_KEY_1 && press.key <= GLFW_KEY_7) set_tool(tool_ / 7 * 7 + press.key - GLFW_KEY_1);
+    switch (press.key) {
+      case GLFW_KEY_F:
+        if (in_view) bring_drill_to_bone(x, y);
+        break;
+      case GLFW_KEY_SPACE: drill_latched_ = !drill_latched_; break;
+      case GLFW_KEY_S: screenshot_wanted_ = true; break;
+      case GLFW_KEY_F1:
+      case GLFW_KEY_H: show_help_ = !show_help_; break;
+      case GLFW_KEY_R: reset(); break;
+      case GLFW_KEY_F5: save(); break;
+      case GLFW_KEY_Q: quit_ = true; break;
+      case GLFW_KEY_C: set_tool(tool_ % 7); break;
+      case GLFW_KEY_D: set_tool(tool_ % 7 + 7); break;
+      case GLFW_KEY_HOME: look_from(kFromLeft); break;
+      default: break;
+    }
+  }
+
+  void reset() {
+    actions_.save();
+    actions_.begin(true);
+    new_bone();
+    park_drill();
+    say("the bone is whole again; the session before was saved");
+  }
+
+  void save() {
+    actions_.save();
+    actions_.begin(false);
+    new_bone();
+    say("saved; a new session goes on from here");
+  }
+
+  void save_screenshot() {
+    screenshot_wanted_ = false;
+    Picture picture{width_, height_, {}};
+    std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * 3);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadBuffer(GL_BACK);
+    glReadPixels(0, 0, width_, height_, GL_RGB, GL_UNSIGNED_BYTE, pixels.data());
+    const std::size_t row = static_cast<std::size_t>(width_) * 3;
+    for (int y = height_ - 1; y >= 0; --y) {
+      const auto* const begin = pixels.data() + static_cast<std::size_t>(y) * row;
+      picture.rgb.insert(picture.rgb.end(), begin, begin + row);
+    }
+    int n = 1;
+    std::filesystem::path path;
+    do {
+      path = actions_.folder() / ("screenshot-" + std::to_string(n++) + ".png");
+    } while (std::filesystem::exists(path));
+    try {
+      save_picture(picture, path);
+      say("saved " + path.filename().string());
+    } catch (const Error& e) {
+      say(e.what());
+    }
+  }
+
+  // --- panel, slices, help ------------------------------------------------------------------------------------------
+
+  void say(const std::string& text) {
+    message_ = text;
+    message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+  }
+
+  void panel() {
+    Rehearsal& rehearsal = actions_.rehearsal();
+    const TickRecord tick = rehearsal.latest();
+    ImGui::SetNextWindowPos({0, 0});
+    ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
+    ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+    ImGui::Text("Burr");
+    int kind = tool_ / 7;
+    if (ImGui::RadioButton("cutting (C)", kind == 0)) set_tool(tool_ % 7);
+    ImGui::SameLine();
+    if (ImGui::RadioButton("diamond (D)", kind == 1)) set_tool(tool_ % 7 + 7);
+    int diameter = tool_ % 7 + 1;
+    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_tool(tool_ / 7 * 7 + diameter - 1);
+    ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
+    ImGui::Separator();
+    const double force = length({static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2])});
+    char text[64];
+    std::snprintf(text, sizeof text, "%.2f N", force);
+    ImGui::Text("Force");
+    const float share = static_cast<float>(std::min(1.0, force / kDisplayForceN));
+    ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImVec4(0.3F + 0.65F * share, 0.75F - 0.5F * share, 0.25F, 1));
+    ImGui::ProgressBar(share, {-1, 22}, text);
+    ImGui::PopStyleColor();
+    ImGui::Text("Depth of burr in bone  %.2f mm", static_cast<double>(tick.depth_mm));
+    ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
+    const double seconds = static_cast<double>(tick.tick) / 1000;
+    ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
+    ImGui::Separator();
+    if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
+    if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
+    if (ImGui::Button("Save and go on (F5)", {-1, 0})) save();
+    if (ImGui::Button("Reset the bone (R)", {-1, 0})) reset();
+    ImGui::Separator();
+    ImGui::Text("Look from");
+    if (ImGui::Button("left")) look_from(kFromLeft);
+    ImGui::SameLine();
+    if (ImGui::Button("right")) look_from({-0.94, -0.25, 0.22});
+    ImGui::SameLine();
+    if (ImGui::Button("front")) look_from({0, -1, 0.1});
+    ImGui::SameLine();
+    if (ImGui::Button("above")) look_from({0, -0.05, 1});
+    ImGui::Separator();
+    ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
+    if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
+    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
+    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(bone_view_->triangles()) / 1e6, static_cast<double>(ImGui::GetIO().Framerate));
+    ImGui::Separator();
+    ImGui::TextWrapped("F1: mouse and keys");
+    if (std::chrono::steady_clock::now() < message_until_) {
+      ImGui::Separator();
+      ImGui::TextWrapped("%s", message_.c_str());
+    }
+    ImGui::End();
+  }
+
+  void slices() {
+    const TickRecord tick = actions_.rehearsal().latest();
+    const Vec3 burr{static_cast<double>(tick.device.position_mm[0]), static_cast<double>(tick.device.position_mm[1]), static_cast<double>(tick.device.position_mm[2])};
+    if (follow_drill_) cross_ = burr;
+    slices_age_ += static_cast<double>(ImGui::GetIO().DeltaTime);
+    const float box = std::min(static_cast<float>(kSliceWidth - 16), (static_cast<float>(height_) - 110) / 3);
+    const bool redraw = slices_age_ > 0.15;
+    ImGui::SetNextWindowPos({static_cast<float>(width_ - kSliceWidth), 0});
+    ImGui::SetNextWindowSize({static_cast<float>(kSliceWidth), static_cast<float>(height_)});
+    ImGui::Begin("Cuts", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
+    ImGui::Checkbox("follow the drill", &follow_drill_);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(90);
+    ImGui::SliderFloat("mm", &slice_mm_, 20, 250, "%.0f");
+    const BrickGrid& bone = actions_.rehearsal().bone();
+    const auto density = [&](Vec3 p) {
+      const Vec3 i = bone.frame().index_from_world(p);
+      return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5)));
+    };
+    // What is left of the bone, in the grey of its CT value where the case has it.
+    const GreyAt grey = [&](Vec3 p) {
+      const double d = static_cast<double>(density(p));
+      if (d <= 0) return 0.0;
+      return d * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(p)))) : 220.0);
+    };
+    static constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
+    for (int n = 0; n < 3; ++n) {
+      SliceView view;
+      view.plane = static_cast<Plane>(n);
+      view.centre_mm = view.through_mm = cross_;
+      view.width = view.height = static_cast<int>(box);
+      view.mm_per_pixel = static_cast<double>(slice_mm_) / view.width;
+      if (redraw) {
+        Picture picture = draw_slice(view, grey);
+        write_directions(picture, view, 0, 0);
+        glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(n)]);
+        glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, picture.width, picture.height, 0, GL_RGB, GL_UNSIGNED_BYTE, picture.rgb.data());
+        glBindTexture(GL_TEXTURE_2D, 0);
+      }
+      ImGui::Text("%s", kNames[n]);
+      const ImVec2 corner = ImGui::GetCursorScreenPos();
+      ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(textures_[static_cast<std::size_t>(n)])), {box, box});
+      if (ImGui::IsItemClicked()) {
+        const ImVec2 m = ImGui::GetMousePos();
+        cross_ = view.world(static_cast<double>(m.x - corner.x), static_cast<double>(m.y - corner.y));
+        follow_drill_ = false;
+        slices_age_ = 1e9;
+      }
+      ImDrawList* const draw = ImGui::GetWindowDrawList();
+      const float half = box / 2;
+      draw->AddLine({corner.x + half, corner.y}, {corner.x + half, corner.y + box}, IM_COL32(90, 160, 255, 90));
+      draw->AddLine({corner.x, corner.y + half}, {corner.x + box, corner.y + half}, IM_COL32(90, 160, 255, 90));
+      const auto at = view.pixel(burr);
+      const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2 / view.mm_per_pixel;
+      draw->PushClipRect(corner, {corner.x + box, corner.y + box}, true);
+      draw->AddCircle({corner.x + static_cast<float>(at[0]), corner.y + static_cast<float>(at[1])}, static_cast<float>(std::max(2.0, r)), IM_COL32(255, 170, 60, 230), 24, 1.5F);
+      draw->PopClipRect();
+    }
+    if (redraw) slices_age_ = 0;
+    ImGui::End();
+  }
+
+  void help() {
+    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 220, 90}, ImGuiCond_Appearing);
+    ImGui::SetNextWindowSize({460, 0});
+    ImGui::Begin("Mouse and keys", &show_help_, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse);
+    static constexpr const char* kRows[][2] = {{"move", "moves the drill across the view"},
+                                               {"F", "brings the drill to the bone under the mouse"},
+                                               {"wheel, Up, Down, Shift-drag", "moves it deeper or back"},
+                                               {"left button, Space", "drills while held; Space: on and off"},
+                                               {"right drag", "turns the view"},
+                                               {"middle drag", "shifts the view"},
+                                               {"Ctrl-wheel", "nearer and farther"},
+                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond"},
+                                               {"S", "screenshot into the session's folder"},
+                                               {"F5", "save the session and go on"},
+                                               {"R", "save the session, the bone is whole again"},
+                                               {"Home", "view from the left"},
+                                               {"Q", "save and close"}};
+    for (const auto& row : kRows) {
+      ImGui::Text("%s", row[0]);
+      ImGui::SameLine(215);
+      ImGui::TextWrapped("%s", row[1]);
+    }
+    ImGui::End();
+  }
+
+  WindowActions actions_;
+  std::optional<GridSampler> hu_;
+  GLFWwindow* window_ = nullptr;
+  int width_ = 0, height_ = 0;
+  vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
+  vtkNew<vtkRenderer> renderer_;
+  vtkNew<vtkSphereSource> burr_source_;
+  vtkNew<vtkCylinderSource> shaft_source_;
+  vtkNew<vtkActor> burr_, shaft_;
+  vtkNew<vtkMatrix4x4> tool_matrix_;
+  std::unique_ptr<BoneView> bone_view_;
+  std::array<GLuint, 3> textures_{};
+  Vec3 centre_{}, cross_{};
+  double radius_ = 100, slices_age_ = 1e9;
+  float slice_mm_ = 90;
+  HandGoal goal_;
+  int tool_;
+  int gl_errors_ = 0;
+  bool drill_latched_ = false, drill_held_ = false, follow_drill_ = true, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
+  std::vector<KeyPress> pressed_keys_;
+  std::string message_;
+  std::chrono::steady_clock::time_point message_until_{};
+};
+
+}  // namespace
+
+int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions) {
+  return RehearsalWindow(options, hu, actions).run();
+}
+
+}  // namespace osteo
