@@ -1,0 +1,19 @@
+# Everything from outside, found once for the whole tree.
+
+find_package(nlohmann_json REQUIRED)
+find_package(TBB REQUIRED)
+find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel CommonMath CommonSystem
+  FiltersCore FiltersSources FiltersGeneral IOImage IOXML IOPLY IOGeometry IOCore ImagingCore RenderingCore RenderingOpenGL2
+  RenderingFreeType glew metaio)
+find_package(DICOM REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+list(APPEND CMAKE_MODULE_PATH ${CMAKE_SYSTEM_PREFIX_PATH})
+# Debian keeps OpenVDB's find module below the library folder.
+find_path(OPENVDB_CMAKE_DIR FindOpenVDB.cmake PATH_SUFFIXES cmake/OpenVDB lib/cmake/OpenVDB
+  lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB PATHS /usr /usr/local REQUIRED)
+list(APPEND CMAKE_MODULE_PATH ${OPENVDB_CMAKE_DIR})
+find_package(OpenVDB REQUIRED)
+find_library(EGL_LIBRARY EGL REQUIRED)

@@ -1,0 +1,48 @@
+# Shared by ./osteo and ./test: installs what is missing and builds what is old. To be sourced.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+
+say() { printf '%s\n' "$*" >&2; }
+
+# Installs the Debian packages that are missing; asks nothing. Does nothing, quickly, when all are there.
+ensure_packages() {
+  local list=$root/libs/cmake/packages.txt stamp=$root/build/.packages missing=() package
+  [ "$stamp" -nt "$list" ] && return
+  if ! command -v dpkg-query >/dev/null; then
+    say "This is not Debian: install what $list names, then build with cmake --preset release."
+    return
+  fi
+  for package in $(grep -v '^#' "$list"); do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+  done
+  if [ ${#missing[@]} -gt 0 ]; then
+    local sudo=
+    if [ "$(id -u)" -ne 0 ]; then
+      command -v sudo >/dev/null || { say "These packages are missing, and there is neither root nor sudo to install them: ${missing[*]}"; exit 9; }
+      sudo=sudo
+    fi
+    say "Installing ${#missing[@]} Debian packages (2 to 4 minutes): ${missing[*]}"
+    $sudo apt-get update -qq >&2 || say "apt-get update failed; trying with what is known"
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2 || { say "The packages could not be installed. Is there a network?"; exit 9; }
+  fi
+  mkdir -p "$root/build" && touch "$stamp"
+}
+
+# ensure_built PRESET TARGET...: builds when a source is newer than the last build.
+ensure_built() {
+  local preset=$1 dir=$root/build/$1 newer
+  shift
+  if [ -e "$dir/.built-$1" ]; then
+    newer=$(find "$root/libs" "$root/apps" "$root/pipelines" "$root/tests" "$root/CMakeLists.txt" "$root/CMakePresets.json" -newer "$dir/.built-$1" -print -quit)
+    [ -z "$newer" ] && return
+  else
+    say "Building (the first time takes some minutes) ..."
+  fi
+  local began
+  began=$(mktemp)
+  (cd "$root" && cmake --preset "$preset" >"$dir.configure.log" 2>&1) || { cat "$dir.configure.log" >&2; say "The build could not be set up."; rm -f "$began"; exit 1; }
+  cmake --build "$dir" --target "$@" >"$dir.build.log" 2>&1 || { grep -E 'error|FAILED|undefined' "$dir.build.log" | head -n 40 >&2; say "The build failed; all of it is in $dir.build.log"; rm -f "$began"; exit 1; }
+  # The time before the build: what was changed meanwhile is built next time.
+  touch -r "$began" "$dir/.built-$1"
+  rm -f "$began"
+}

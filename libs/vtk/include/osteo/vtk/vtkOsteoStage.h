@@ -1,0 +1,76 @@
+/// @class vtkOsteoStage
+/// Any Osteotome stage as a VTK filter. Images, masks and surfaces are VTK's own data sets, without copies of voxels; sparse
+/// grids and pictures travel as vtkOsteoDataObject. Progress and abort are VTK's; a failure sets the error code, is told by
+/// vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again.
+///
+/// @code
+/// vtkNew<vtkOsteoStage> threshold;
+/// threshold->SetStage(registry, "threshold");
+/// threshold->SetParameter("lower", "250");
+/// threshold->SetInputConnection(reader->GetOutputPort());
+/// @endcode
+#ifndef vtkOsteoStage_h
+#define vtkOsteoStage_h
+
+#include <vtkAlgorithm.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "osteo/base/error.h"
+#include "osteo/stage/stage.h"
+
+class vtkOsteoStage : public vtkAlgorithm {
+ public:
+  static vtkOsteoStage* New();
+  vtkTypeMacro(vtkOsteoStage, vtkAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /// Chooses the stage and makes its ports. Returns false, with GetLastError(), when there is none of that name.
+  bool SetStage(const osteo::Registry& registry, const std::string& name);
+  /// Sets a parameter from text. Returns false, with GetLastError(), when name or value are wrong. A value equal to the
+  /// present one does not modify the filter.
+  bool SetParameter(const std::string& name, const std::string& value);
+  std::string GetParameter(const std::string& name);
+  /// For stages that read a file or folder themselves (import).
+  void SetSourcePath(const std::string& path);
+
+  /// Index of the VTK port of a stage's input or output; -1 when there is none.
+  int GetInputPortIndex(const std::string& name) const;
+  int GetOutputPortIndex(const std::string& name) const;
+
+  const std::string& GetLastError() const { return this->LastError; }
+  /// Facts measured in the last run, e.g. volume_after_mm3.
+  const osteo::Report& GetReport() const { return this->LastReport; }
+
+  vtkMTimeType GetMTime() override;
+  vtkTypeBool ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+
+ protected:
+  vtkOsteoStage();
+  ~vtkOsteoStage() override;
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int FillOutputPortInformation(int port, vtkInformation* info) override;
+
+ private:
+  vtkOsteoStage(const vtkOsteoStage&) = delete;
+  void operator=(const vtkOsteoStage&) = delete;
+
+  bool CreateOutputs(vtkInformationVector* outputs);
+  bool Inform(vtkInformationVector** inputs, vtkInformationVector* outputs);
+  bool Execute(vtkInformationVector** inputs, vtkInformationVector* outputs);
+  bool Run(vtkInformationVector** inputs);
+  void Fail(const osteo::Error* error, const std::string& text);
+
+  std::unique_ptr<osteo::Stage> Stage;
+  std::vector<int> StageInputOfPort;  // VTK input port -> input of the stage (file inputs have no VTK port)
+  std::string SourcePath;
+  std::vector<osteo::Data> Results;  // of a run done ahead, when its output's extent had to be known
+  vtkMTimeType ResultsTime = 0;
+  bool Failed = false;
+  std::string LastError;
+  osteo::Report LastReport;
+};
+
+#endif
