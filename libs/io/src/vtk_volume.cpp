@@ -173,7 +173,22 @@ RawVolume read_nifti(const fs::path& path, const Context& context) {
   return raw;
 }
 
-void write_nifti(const RawVolume& raw, const fs::path& path) {
+// The same voxels at the same places with the slices counted from the other end.
+RawVolume with_slices_reversed(const RawVolume& raw) {
+  RawVolume out = raw;
+  const auto nz = static_cast<std::size_t>(raw.frame.dims[2]);
+  out.frame.origin_mm = raw.frame.world_from_index({0, 0, static_cast<double>(nz) - 1});
+  out.frame.direction.column[2] = -raw.frame.direction.column[2];
+  const std::size_t slice = raw.frame.voxel_count() / nz * size_of(raw.type);
+  const auto bytes = std::make_shared_for_overwrite<std::byte[]>(slice * nz);
+  for (std::size_t k = 0; k < nz; ++k) std::memcpy(bytes.get() + k * slice, static_cast<const std::byte*>(raw.data.get()) + (nz - 1 - k) * slice, slice);
+  out.data = std::shared_ptr<const void>(bytes, bytes.get());
+  return out;
+}
+
+void write_nifti(const RawVolume& given, const fs::path& path) {
+  // A qform holds only rotations: a left-handed volume is written with its slices in reverse order.
+  const RawVolume raw = determinant(given.frame.direction) < 0 ? with_slices_reversed(given) : given;
   write_atomically(path, [&](const fs::path& temporary) {
     const QuietVtk quiet;
     // The matrix carries the place; the VTK image itself stays at the origin with unit axes.
@@ -194,7 +209,6 @@ void write_nifti(const RawVolume& raw, const fs::path& path) {
     vtkNew<vtkNIFTIImageWriter> writer;
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(image);
-    writer->SetQFac(determinant(f.direction) < 0 ? -1 : 1);
     writer->SetQFormMatrix(ras);
     writer->SetSFormMatrix(ras);
     writer->SetDescription("Osteotome");
@@ -203,8 +217,47 @@ void write_nifti(const RawVolume& raw, const fs::path& path) {
   });
 }
 
+// MetaIO reads what there is of a cut file and says nothing: compare sizes with the header first.
+void require_whole_meta(const fs::path& path) {
+  const auto bytes = read_file(path);
+  const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto value_of = [&](std::string_view key) -> std::string {
+    const std::size_t limit = std::min<std::size_t>(all.size(), 1 << 16);
+    for (std::size_t at = 0; at < limit;) {
+      const std::size_t end = std::min(all.find('\n', at), limit);
+      std::string_view line = all.substr(at, end - at);
+      const std::size_t equals = line.find('=');
+      if (equals != std::string_view::npos && line.substr(0, equals).find(key) != std::string_view::npos) {
+        line.remove_prefix(equals + 1);
+        while (line.starts_with(' ')) line.remove_prefix(1);
+        while (line.ends_with(' ') || line.ends_with('\r')) line.remove_suffix(1);
+        return std::string(line);
+      }
+      at = end + 1;
+    }
+    return {};
+  };
+  const std::string data_file = value_of("ElementDataFile");
+  if (data_file.empty()) fail(path, "this is not a whole MetaImage header", "the file may be cut short; copy it again from its source");
+  if (value_of("CompressedData") != "True") return;  // MetaIO checks the size of plain data
+  const std::string size = value_of("CompressedDataSize");
+  if (size.empty()) return;
+  std::uint64_t there = 0;
+  if (data_file == "LOCAL") {
+    const std::size_t line = all.find("ElementDataFile");
+    there = bytes.size() - std::min(bytes.size(), all.find('\n', line) + 1);
+  } else {
+    require_readable(path.parent_path() / data_file);
+    there = fs::file_size(path.parent_path() / data_file);
+  }
+  if (static_cast<double>(there) < parse_number(size, "CompressedDataSize")) {
+    fail(path, "it holds " + std::to_string(there) + " bytes of packed voxels but needs " + size, "the file was cut short; copy it again from its source");
+  }
+}
+
 RawVolume read_meta(const fs::path& path) {
   require_readable(path);
+  require_whole_meta(path);
   vtkmetaio::MetaImage meta;
   if (!meta.Read(path.c_str(), true)) fail(path, "cannot be read as MetaImage", "the file may be cut short or its data file missing");
   if (meta.NDims() != 3) fail(path, "it has " + std::to_string(meta.NDims()) + " axes; a volume has three");

@@ -306,9 +306,10 @@ void vtkOsteoStage::Fail(const osteo::Error* error, const std::string& text) {
   this->Results.clear();
   this->LastError = text;
   const auto code = error != nullptr ? error->code() : osteo::ExitCode::unspecified;
-  this->SetErrorCode(code == osteo::ExitCode::no_input      ? vtkErrorCode::FileNotFoundError
-                     : code == osteo::ExitCode::cannot_read ? vtkErrorCode::CannotOpenFileError
-                     : code == osteo::ExitCode::corrupt     ? vtkErrorCode::FileFormatError
-                                                            : vtkErrorCode::UserError + static_cast<unsigned long>(code));
+  unsigned long vtk_code = vtkErrorCode::UserError + static_cast<unsigned long>(code);
+  if (code == osteo::ExitCode::no_input) vtk_code = vtkErrorCode::FileNotFoundError;
+  if (code == osteo::ExitCode::cannot_read) vtk_code = vtkErrorCode::CannotOpenFileError;
+  if (code == osteo::ExitCode::corrupt) vtk_code = vtkErrorCode::FileFormatError;
+  this->SetErrorCode(vtk_code);
   vtkErrorMacro(<< this->Stage->info().name << ": " << text);
 }

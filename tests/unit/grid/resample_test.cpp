@@ -1,0 +1,162 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/grid/brick_grid.h"
+#include "osteo/grid/grid_io.h"
+#include "osteo/grid/resample.h"
+#include "osteo/image/phantom.h"
+#include "osteo/image/threshold.h"
+
+namespace osteo {
+namespace {
+
+// A ball of 1000 HU in 0 HU with a smooth edge: where the threshold of 500 lies is known exactly.
+Image ball(double spacing_z, double radius) {
+  Frame f;
+  f.dims = {60, 60, static_cast<int>(60 / spacing_z)};
+  f.spacing_mm = {1, 1, spacing_z};
+  f.origin_mm = {-29.7, -29.4, -29.8};
+  const auto v = make_voxels<std::int16_t>(f.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < f.dims[2]; ++k)
+    for (int j = 0; j < f.dims[1]; ++j)
+      for (int i = 0; i < f.dims[0]; ++i) {
+        const double d = radius - length(f.world_from_index({double(i), double(j), double(k)}));
+        v[at++] = static_cast<std::int16_t>(std::lround(500 + 500 * std::tanh(d / 1.5)));
+      }
+  return {f, v};
+}
+
+ResampledBone bone_of(const Image& ct, double spacing, int threads = 0) {
+  ThresholdParams t;
+  t.lower = 500;
+  ResampleParams r;
+  r.lower = 500;
+  r.spacing_mm = spacing;
+  Context c;
+  c.threads = threads;
+  return resample_bone(ct, threshold(ct, t), r, c);
+}
+
+TEST(Resample, BallKeepsItsVolumeAtEveryVoxelSize) {
+  const double exact = 4.0 / 3 * M_PI * std::pow(20.3, 3);
+  for (const double z : {1.0, 2.0}) {
+    const Image ct = ball(z, 20.3);
+    for (const double h : {0.25, 0.5, 1.0, 2.0, 3.7}) {
+      const auto bone = bone_of(ct, h);
+      EXPECT_NEAR(bone.volume_after_mm3 / bone.volume_before_mm3, 1, 0.005) << h;
+      EXPECT_NEAR(bone.volume_after_mm3 / exact, 1, 0.01) << h;
+    }
+  }
+}
+
+TEST(Resample, DensityIsTheShareOfTheVoxelInside) {
+  const Image ct = ball(1, 20.3);
+  const auto bone = to_bricks(bone_of(ct, 1.0).density);
+  const Frame& f = bone.frame();
+  double worst = 0, mean = 0;
+  int n = 0;
+  for (int k = 5; k < f.dims[2] - 5; k += 3)
+    for (int j = 5; j < f.dims[1] - 5; j += 3)
+      for (int i = 5; i < f.dims[0] - 5; i += 3) {
+        double inside = 0;
+        for (int s = 0; s < 1000; ++s) {
+          inside += length(f.world_from_index({i + (s % 10 - 4.5) / 10, j + (s / 10 % 10 - 4.5) / 10, k + (s / 100 - 4.5) / 10})) < 20.3 ? 0.001 : 0;
+        }
+        const double e = std::abs(inside - static_cast<double>(bone.at(i, j, k)));
+        worst = std::max(worst, e);
+        mean += e;
+        ++n;
+      }
+  EXPECT_LT(worst, 0.15);
+  EXPECT_LT(mean / n, 0.005);
+}
+
+TEST(Resample, SameBytesForAnyThreadCount) {
+  const Image ct = ball(2, 12);
+  EXPECT_EQ(to_bricks(bone_of(ct, 0.5, 1).density).hash(), to_bricks(bone_of(ct, 0.5, 2).density).hash());
+}
+
+TEST(Resample, DroppedPiecesStayDropped) {
+  // Two cubes; the mask keeps the larger one only.
+  Frame f;
+  f.dims = {30, 12, 12};
+  const auto v = make_voxels<std::int16_t>(f.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < 12; ++k)
+    for (int j = 0; j < 12; ++j)
+      for (int i = 0; i < 30; ++i) v[at++] = (i > 2 && i < 11 && j > 1 && j < 10 && k > 1 && k < 10) || (i > 20 && i < 25 && j > 3 && j < 8 && k > 3 && k < 8) ? 1000 : 0;
+  const Image ct{f, v};
+  ThresholdParams t;
+  t.lower = 500;
+  t.keep_largest = 1;
+  ResampleParams r;
+  r.lower = 500;
+  const auto bone = to_bricks(resample_bone(ct, threshold(ct, t), r).density);
+  const Vec3 in_small = bone.frame().index_from_world(f.world_from_index({22, 5, 5})), in_large = bone.frame().index_from_world(f.world_from_index({6, 5, 5}));
+  EXPECT_EQ(bone.at(std::lround(in_small.x), std::lround(in_small.y), std::lround(in_small.z)), 0.0F);
+  EXPECT_EQ(bone.at(std::lround(in_large.x), std::lround(in_large.y), std::lround(in_large.z)), 1.0F);
+}
+
+TEST(Resample, OnlyBoneIsStored) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 2;
+  const auto bone = bone_of(make_phantom(p).ct, 1);
+  EXPECT_EQ(bone.hu.active_voxels, bone.density.active_voxels);
+}
+
+TEST(Resample, MaskElsewhereIsRefused) {
+  const Image ct = ball(1, 10);
+  Labels mask = threshold(ct, {});
+  mask.frame.origin_mm.x += 1;
+  EXPECT_THROW(static_cast<void>(resample_bone(ct, mask, {})), Error);
+}
+
+TEST(GridIo, VdbKeepsVoxelsAndObliqueFrame) {
+  Frame f;
+  f.dims = {20, 20, 20};
+  f.spacing_mm = {0.5, 0.5, 0.5};
+  f.origin_mm = {-3, 4, 5.5};
+  const Vec3 u = normalized({1, 0.3, -0.2}), w = normalized(cross(u, {0, 1, 0.1}));
+  f.direction = {{u, cross(w, u), w}};
+  BrickGrid bricks(f, {{0, 0, 0}, {2, 1, 0}, {1, 2, 2}});
+  for (VoxelKey v = 0; v < 3 * 512; v += 7) bricks.set(v, 0.001F * static_cast<float>(v % 997) + 0.001F);
+  const auto path = std::filesystem::temp_directory_path() / ("osteo-grid-" + std::to_string(::getpid()) + ".vdb");
+  save_grid(to_sparse(bricks, "density"), path);
+  const BrickGrid back = to_bricks(load_grid(path));
+  EXPECT_TRUE(same_place(back.frame(), f, 1e-6));
+  for (VoxelKey v = 0; v < 3 * 512; ++v) {
+    const Ijk c = bricks.coordinate(v);
+    EXPECT_EQ(back.at(c.i, c.j, c.k), bricks.value(v));
+  }
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  EXPECT_THROW(static_cast<void>(load_grid(path)), Error);
+}
+
+TEST(BrickGrid, FindCoordinateAndBlocksAgree) {
+  Frame f;
+  f.dims = {32, 32, 32};
+  BrickGrid g(f, {{3, 0, 1}, {0, 0, 0}, {2, 3, 3}});
+  for (VoxelKey v = 0; v < 3 * 512; ++v) {
+    const Ijk c = g.coordinate(v);
+    EXPECT_EQ(g.find(c.i, c.j, c.k), v);
+    g.set(v, static_cast<float>(v));
+  }
+  EXPECT_EQ(g.find(-1, 0, 0), BrickGrid::kNone);
+  EXPECT_EQ(g.find(8, 0, 0), BrickGrid::kNone);
+  EXPECT_EQ(g.find(0, 0, 99), BrickGrid::kNone);
+  std::vector<float> block(13 * 11 * 12);
+  g.read_block({-3, -2, 5}, {13, 11, 12}, block.data());
+  std::size_t at = 0;
+  for (int k = 5; k < 17; ++k)
+    for (int j = -2; j < 9; ++j)
+      for (int i = -3; i < 10; ++i) EXPECT_EQ(block[at++], g.at(i, j, k));
+}
+
+}  // namespace
+}  // namespace osteo

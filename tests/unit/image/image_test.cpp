@@ -1,0 +1,195 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "osteo/base/error.h"
+#include "osteo/image/components.h"
+#include "osteo/image/distance.h"
+#include "osteo/image/phantom.h"
+#include "osteo/image/threshold.h"
+
+namespace osteo {
+namespace {
+
+std::vector<std::uint8_t> random_mask(std::size_t n, double share, unsigned seed) {
+  std::mt19937 random(seed);
+  std::bernoulli_distribution on(share);
+  std::vector<std::uint8_t> mask(n);
+  for (auto& v : mask) v = on(random) ? 1 : 0;
+  return mask;
+}
+
+// Flood fill, the obvious way.
+std::vector<int> brute_components(const std::vector<std::uint8_t>& mask, std::array<int, 3> d, bool full, std::uint8_t value) {
+  std::vector<int> label(mask.size(), -1);
+  int next = 0;
+  for (std::size_t s = 0; s < mask.size(); ++s) {
+    if (mask[s] != value || label[s] >= 0) continue;
+    std::vector<std::size_t> stack{s};
+    label[s] = next;
+    while (!stack.empty()) {
+      const std::size_t at = stack.back();
+      stack.pop_back();
+      const int i = at % d[0], j = at / d[0] % d[1], k = at / d[0] / d[1];
+      for (int n = 0; n < 27; ++n) {
+        const int di = n % 3 - 1, dj = n / 3 % 3 - 1, dk = n / 9 - 1;
+        if (!full && std::abs(di) + std::abs(dj) + std::abs(dk) != 1) continue;
+        const int x = i + di, y = j + dj, z = k + dk;
+        if (x < 0 || y < 0 || z < 0 || x >= d[0] || y >= d[1] || z >= d[2]) continue;
+        const std::size_t to = (static_cast<std::size_t>(z) * d[1] + y) * d[0] + x;
+        if (mask[to] != value || label[to] >= 0) continue;
+        label[to] = next;
+        stack.push_back(to);
+      }
+    }
+    ++next;
+  }
+  return label;
+}
+
+TEST(Components, EqualFloodFill) {
+  const std::array<int, 3> d{13, 9, 11};
+  for (unsigned seed = 0; seed < 24; ++seed) {
+    const bool full = seed % 2 == 0;
+    const auto value = static_cast<std::uint8_t>(seed / 2 % 2);
+    const auto mask = random_mask(13 * 9 * 11, 0.1 + 0.03 * seed, seed);
+    const auto expected = brute_components(mask, d, full, value);
+    const auto found = connected_components(mask, d, value, full ? Connectivity::full : Connectivity::face);
+    std::uint64_t voxels = 0;
+    for (std::size_t r = 0; r < found.runs.size(); ++r) {
+      for (std::uint32_t x = found.runs[r].begin; x < found.runs[r].end; ++x, ++voxels) {
+        EXPECT_EQ(expected[found.runs[r].row * 13 + x], static_cast<int>(found.component[r]));
+      }
+    }
+    EXPECT_EQ(voxels, static_cast<std::uint64_t>(std::count(mask.begin(), mask.end(), value)));
+  }
+}
+
+TEST(Distance, EqualsBruteForceWithAnisotropicVoxels) {
+  Frame f;
+  f.dims = {11, 7, 9};
+  f.spacing_mm = {0.7, 1.3, 2.1};
+  const auto mask = random_mask(f.voxel_count(), 0.04, 5);
+  const auto d = squared_distance_mm2(mask, f, 1);
+  for (int s = 0; s < static_cast<int>(mask.size()); ++s) {
+    double best = 1e30;
+    for (int t = 0; t < static_cast<int>(mask.size()); ++t) {
+      if (mask[t] == 0) continue;
+      const double x = (s % 11 - t % 11) * 0.7, y = (s / 11 % 7 - t / 11 % 7) * 1.3, z = (s / 77 - t / 77) * 2.1;
+      best = std::min(best, x * x + y * y + z * z);
+    }
+    EXPECT_NEAR(d[s], best, 1e-4);
+  }
+}
+
+TEST(Distance, InfiniteWithoutAnySite) {
+  Frame f;
+  f.dims = {3, 3, 3};
+  const std::vector<std::uint8_t> mask(27, 0);
+  for (const float v : squared_distance_mm2(mask, f, 1)) EXPECT_EQ(v, std::numeric_limits<float>::infinity());
+}
+
+Image image_of(std::array<int, 3> dims, const std::function<int(int, int, int)>& f) {
+  Frame frame;
+  frame.dims = dims;
+  const auto v = make_voxels<std::int16_t>(frame.voxel_count());
+  for (int k = 0; k < dims[2]; ++k)
+    for (int j = 0; j < dims[1]; ++j)
+      for (int i = 0; i < dims[0]; ++i) v[(static_cast<std::size_t>(k) * dims[1] + j) * dims[0] + i] = static_cast<std::int16_t>(f(i, j, k));
+  return {frame, v};
+}
+
+std::size_t count(const Labels& l) { return static_cast<std::size_t>(std::count(l.span().begin(), l.span().end(), 1)); }
+
+TEST(Threshold, BoundsAreInclusive) {
+  const auto ct = image_of({4, 1, 1}, [](int i, int, int) { return std::array{299, 300, 500, 501}[i]; });
+  ThresholdParams p;
+  p.upper = 500;
+  p.min_volume_mm3 = 0;
+  const auto m = threshold(ct, p);
+  EXPECT_EQ(std::vector<int>(m.span().begin(), m.span().end()), (std::vector<int>{0, 1, 1, 0}));
+}
+
+TEST(Threshold, HysteresisKeepsOnlyPiecesWithACore) {
+  // Two bars of 400 HU, one of them with a voxel of 900.
+  const auto ct = image_of({20, 3, 3}, [](int i, int j, int k) { return j == 1 && k == 1 && i < 8 ? (i == 3 ? 900 : 400) : j == 1 && k == 1 && i > 10 ? 400 : 0; });
+  ThresholdParams p;
+  p.min_volume_mm3 = 0;
+  EXPECT_EQ(count(threshold(ct, p)), 17u);
+  p.core = 800;
+  EXPECT_EQ(count(threshold(ct, p)), 8u);
+}
+
+TEST(Threshold, ClosingBridgesGapsAndFillingFillsCavities) {
+  const auto gap = image_of({21, 9, 9}, [](int i, int j, int k) { return i != 10 && j > 1 && j < 7 && k > 1 && k < 7 ? 500 : 0; });
+  ThresholdParams p;
+  p.keep_largest = 1;
+  EXPECT_EQ(count(threshold(gap, p)), 250u);
+  p.close_mm = 1;
+  EXPECT_GT(count(threshold(gap, p)), 500u);
+  const auto shell = image_of({9, 9, 9}, [](int i, int j, int k) { return std::max({std::abs(i - 4), std::abs(j - 4), std::abs(k - 4)}) == 2 ? 500 : 0; });
+  ThresholdParams q;
+  EXPECT_EQ(count(threshold(shell, q)), 125u - 27u);
+  q.fill_mm3 = 26;
+  EXPECT_EQ(count(threshold(shell, q)), 125u - 27u);
+  q.fill_mm3 = 27;
+  EXPECT_EQ(count(threshold(shell, q)), 125u);
+}
+
+TEST(Threshold, KeepsTheLargestAndDropsTheSmall) {
+  const auto ct = image_of({30, 3, 3}, [](int i, int, int) { return i < 10 || (i > 12 && i < 18) || i == 25 ? 500 : 0; });
+  ThresholdParams p;
+  EXPECT_EQ(count(threshold(ct, p)), 90u + 45u);  // the slab of 9 mm3 goes
+  p.keep_largest = 1;
+  EXPECT_EQ(count(threshold(ct, p)), 90u);
+  p.lower = 3000;
+  EXPECT_THROW(static_cast<void>(threshold(ct, p)), Error);
+  p.lower = 600;
+  p.upper = 500;
+  EXPECT_THROW(static_cast<void>(threshold(ct, p)), Error);
+}
+
+TEST(Phantom, SameBytesForAnyThreadCount) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 1.5;
+  Context one, two;
+  one.threads = 1;
+  two.threads = 2;
+  const auto a = make_phantom(p, one), b = make_phantom(p, two);
+  EXPECT_TRUE(std::equal(a.ct.span().begin(), a.ct.span().end(), b.ct.span().begin()));
+  EXPECT_EQ(a.bone_mm3, b.bone_mm3);
+}
+
+TEST(Phantom, HoldsEveryTissueAndTheMarkerOnlyAtTheLeft) {
+  PhantomParams p;
+  p.spacing_mm = 2;
+  const auto phantom = make_phantom(p);
+  std::map<int, int> seen;
+  for (int k = 0; k < phantom.labels.frame.dims[2]; ++k)
+    for (int j = 0; j < phantom.labels.frame.dims[1]; ++j)
+      for (int i = 0; i < phantom.labels.frame.dims[0]; ++i) {
+        const int l = phantom.labels.at(i, j, k);
+        ++seen[l];
+        if (l != static_cast<int>(Tissue::left_marker)) continue;
+        EXPECT_GT(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}).x, 0);
+      }
+  for (int t = 0; t < kTissueCount; ++t) EXPECT_GT(seen[t], 0) << tissue_name(static_cast<Tissue>(t));
+}
+
+TEST(Phantom, LabelsAreTheExactTissue) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 2;
+  const auto phantom = make_phantom(p);
+  for (int k = 0; k < phantom.labels.frame.dims[2]; k += 3)
+    for (int j = 0; j < phantom.labels.frame.dims[1]; j += 3)
+      for (int i = 0; i < phantom.labels.frame.dims[0]; i += 3) {
+        EXPECT_EQ(phantom.labels.at(i, j, k), static_cast<int>(phantom_tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
+      }
+}
+
+}  // namespace
+}  // namespace osteo

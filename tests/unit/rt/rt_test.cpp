@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "osteo/rt/histogram.h"
+#include "osteo/rt/loop.h"
+#include "osteo/rt/ring.h"
+#include "osteo/rt/seqlock.h"
+
+namespace osteo {
+namespace {
+
+TEST(Ring, KeepsOrderBetweenTwoThreads) {
+  Ring<std::uint64_t> ring(64);
+  constexpr std::uint64_t kCount = 300'000;
+  std::thread producer([&] {
+    for (std::uint64_t i = 0; i < kCount;) {
+      std::uint64_t batch[3] = {i, i + 1, i + 2};
+      if (ring.push({batch, 3})) {
+        i += 3;
+      } else {
+        std::this_thread::yield();
+      }
+    }
+  });
+  std::uint64_t expected = 0;
+  std::vector<std::uint64_t> out(10);
+  while (expected < kCount) {
+    const std::size_t n = ring.pop(out);
+    if (n == 0) std::this_thread::yield();
+    for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(out[i], expected++);
+  }
+  producer.join();
+}
+
+TEST(Ring, PushIsAllOrNothing) {
+  Ring<int> ring(4);
+  const int five[5] = {1, 2, 3, 4, 5};
+  EXPECT_FALSE(ring.push({five, 5}));
+  EXPECT_TRUE(ring.push({five, 4}));
+  EXPECT_EQ(ring.room(), 0u);
+  EXPECT_FALSE(ring.push(9));
+}
+
+TEST(Seqlock, ReaderNeverSeesAHalfWrittenValue) {
+  struct Value {
+    std::array<std::uint64_t, 9> x;
+  };
+  Seqlock<Value> lock;
+  std::atomic<bool> stop{false};
+  std::thread writer([&] {
+    for (std::uint64_t n = 1; !stop; ++n) {
+      Value v;
+      v.x.fill(n);
+      lock.store(v);
+    }
+  });
+  for (int n = 0; n < 200'000; ++n) {
+    Value v;
+    if (!lock.try_load(v)) continue;
+    for (const auto x : v.x) ASSERT_EQ(x, v.x[0]);
+  }
+  stop = true;
+  writer.join();
+}
+
+TEST(Histogram, QuantilesWithinAnEighth) {
+  Histogram h;
+  std::mt19937 random(1);
+  std::vector<std::int64_t> all;
+  std::lognormal_distribution<double> d(9, 2);
+  for (int i = 0; i < 20000; ++i) {
+    all.push_back(static_cast<std::int64_t>(d(random)));
+    h.add(all.back());
+  }
+  std::sort(all.begin(), all.end());
+  for (const double q : {0.01, 0.5, 0.99, 0.999}) {
+    const double exact = static_cast<double>(all[static_cast<std::size_t>(std::ceil(q * 20000)) - 1]) / 1000;
+    EXPECT_GE(h.quantile_us(q), exact * 0.999);
+    EXPECT_LE(h.quantile_us(q), exact * 1.13 + 0.001);
+  }
+  EXPECT_NEAR(h.max_us(), static_cast<double>(all.back()) / 1000, 1e-9);
+}
+
+TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
+  int calls = 0;
+  FixedRateLoop loop(1000, [&](std::int64_t) {
+    if (++calls == 20) std::this_thread::sleep_for(std::chrono::milliseconds(7));
+    return calls < 60;
+  });
+  const auto begin = monotonic_ns();
+  loop.start();
+  loop.join();
+  EXPECT_EQ(calls, 60);
+  EXPECT_EQ(loop.stats().ticks, 60u);
+  EXPECT_GE(loop.stats().missed_by_work, 5u);  // the sleep of 7 ms
+  EXPECT_GE(monotonic_ns() - begin, 60'000'000);
+  EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
+}
+
+}  // namespace
+}  // namespace osteo

@@ -1,0 +1,128 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/session/script_file.h"
+#include "osteo/session/session_file.h"
+
+namespace osteo {
+namespace {
+
+fs::path fresh(const std::string& name) {
+  const auto p = fs::temp_directory_path() / ("osteo-session-" + std::to_string(::getpid()) + "-" + name);
+  fs::remove_all(p);
+  return p;
+}
+
+std::vector<TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
+  std::vector<TickRecord> t(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    t[i].tick = first + i;
+    t[i].device.position_mm = {static_cast<float>(i), 0.1F, -3};
+    t[i].removed_mm3 = 0.25F;
+  }
+  return t;
+}
+
+SessionHeader header() {
+  SessionHeader h;
+  h.program_version = "test";
+  h.bone_hash = "abc";
+  h.rate_hz = 2000;
+  h.contact.stiffness_n_per_mm = 1.25;
+  return h;
+}
+
+TEST(SessionFile, RoundTrip) {
+  const auto path = fresh("round");
+  {
+    SessionWriter w(path, header());
+    w.append(some_ticks(0, 100), std::vector<VoxelChange>{{5, 0.5F}, {3, 0.9F}, {5, 0.25F}});
+    w.append(some_ticks(100, 7), {});
+    w.finish({107, "bone", "surface", 26.75});
+  }
+  const Session s = read_session(path);
+  EXPECT_EQ(s.header.rate_hz, 2000);
+  EXPECT_EQ(s.header.contact.stiffness_n_per_mm, 1.25);
+  ASSERT_EQ(s.ticks.size(), 107u);
+  EXPECT_EQ(s.ticks[42].device.position_mm[0], 42.0F);
+  ASSERT_EQ(s.changes.size(), 2u);  // the last of each voxel
+  EXPECT_EQ(s.changes[1].voxel, 5u);
+  EXPECT_EQ(s.changes[1].density, 0.25F);
+  ASSERT_TRUE(s.end.has_value());
+  EXPECT_EQ(s.end->surface_hash, "surface");
+}
+
+TEST(SessionFile, CutAnywhereKeepsWhatWasWholeBefore) {
+  const auto path = fresh("cut");
+  {
+    SessionWriter w(path, header());
+    for (std::uint64_t b = 0; b < 5; ++b) w.append(some_ticks(b * 10, 10), std::vector<VoxelChange>{{static_cast<VoxelKey>(b), 0.5F}});
+    w.finish({50, "bone", "surface", 1});
+  }
+  const std::string whole = read_text(path);
+  const auto cut = fresh("cut2");
+  std::size_t least = 1000;
+  for (std::size_t n = whole.size() - 1; n > 400; n -= 13) {
+    std::ofstream(cut, std::ios::binary) << whole.substr(0, n);
+    const Session s = read_session(cut);
+    EXPECT_FALSE(s.end.has_value());
+    EXPECT_EQ(s.ticks.size() % 10, 0u);
+    EXPECT_LE(s.ticks.size(), least);
+    least = s.ticks.size();
+  }
+}
+
+TEST(SessionFile, DamageInTheMiddleIsNotOverlooked) {
+  const auto path = fresh("damage");
+  {
+    SessionWriter w(path, header());
+    for (std::uint64_t b = 0; b < 5; ++b) w.append(some_ticks(b * 10, 10), {});
+    w.finish({50, "bone", "surface", 1});
+  }
+  std::string bytes = read_text(path);
+  bytes[bytes.size() / 2] ^= 0x10;
+  std::ofstream(path, std::ios::binary) << bytes;
+  EXPECT_THROW(static_cast<void>(read_session(path)), Error);
+  std::ofstream(path, std::ios::binary) << "not a session at all, but long enough to look at";
+  EXPECT_THROW(static_cast<void>(read_session(path)), Error);
+}
+
+TEST(SessionFile, IsNeverOverwritten) {
+  const auto path = fresh("twice");
+  { SessionWriter w(path, header()); }
+  EXPECT_THROW(SessionWriter(path, header()), Error);
+}
+
+TEST(Script, RoundTripAndErrorsSayWhere) {
+  Script s;
+  s.tool = burr_index("diamond", 3);
+  s.axis = {0, 0.6, 0.8};
+  s.waypoints = {{0, {1, 2, 3}, false}, {1.5, {4, 5, 6}, true}};
+  const auto path = fresh("strokes.json");
+  write_file(path, script_json(s));
+  const Script back = load_script(path);
+  EXPECT_EQ(back.tool, s.tool);
+  EXPECT_EQ(back.axis, s.axis);
+  EXPECT_EQ(back.waypoints[1].at_mm, (Vec3{4, 5, 6}));
+  EXPECT_FALSE(back.waypoints[0].drill_on);
+  const auto message = [&](const std::string& text) -> std::string {
+    write_file(path, text);
+    try {
+      static_cast<void>(load_script(path));
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "read";
+  };
+  EXPECT_NE(message("{}").find("header"), std::string::npos);
+  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4.5},"axis":[0,0,1],"waypoints":[]})").find("4.5 mm"), std::string::npos);
+  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4},"axis":[0,0,1],"waypoints":[{"t_s":1,"at_mm":[0,0,0]},{"t_s":1,"at_mm":[0,0,0]}]})").find("waypoint 2"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteo
