@@ -143,7 +143,7 @@ struct DemoCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
-/// All stages and commands of osteo.
-[[nodiscard]] cli::Program& osteo_program();
+/// All stages and commands of osteo, with their parameters at the defaults.
+[[nodiscard]] cli::Program make_osteo_program();
 
 }  // namespace osteo

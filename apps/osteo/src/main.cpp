@@ -2,4 +2,7 @@
 
 #include "commands.h"
 
-int main(int argc, char** argv) { return osteo::cli::run_program(osteo::osteo_program(), argc, argv, std::cout, std::cerr); }
+int main(int argc, char** argv) {
+  osteo::cli::Program program = osteo::make_osteo_program();
+  return osteo::cli::run_program(program, argc, argv, std::cout, std::cerr);
+}

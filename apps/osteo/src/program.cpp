@@ -8,32 +8,29 @@
 
 namespace osteo {
 
-cli::Program& osteo_program() {
-  static cli::Program program = [] {
-    cli::Program p;
-    p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
-    p.licence =
-        "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, OpenVDB, oneTBB and zlib (all permissive or MPL-2.0);\n"
-        "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
-        "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
-    p.registry.add<ImportStage>();
-    p.registry.add<ThresholdStage>();
-    p.registry.add<ResampleStage>();
-    p.registry.add<SurfaceStage>();
-    p.registry.add<SnapshotStage>();
-    p.registry.add<PhantomStage>();
-    p.add<ListCommand>();
-    p.add<InfoCommand>();
-    p.add<SeriesCommand>();
-    p.add<RunCommand>();
-    p.add<PrepareCommand>();
-    p.add<RehearseCommand>();
-    p.add<ReplayCommand>();
-    p.add<DemoCommand>();
-    p.add<DocsCommand>();
-    return p;
-  }();
-  return program;
+cli::Program make_osteo_program() {
+  cli::Program p;
+  p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
+  p.licence =
+      "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, OpenVDB, oneTBB and zlib (all permissive or MPL-2.0);\n"
+      "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
+      "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
+  p.registry.add<ImportStage>();
+  p.registry.add<ThresholdStage>();
+  p.registry.add<ResampleStage>();
+  p.registry.add<SurfaceStage>();
+  p.registry.add<SnapshotStage>();
+  p.registry.add<PhantomStage>();
+  p.add<ListCommand>();
+  p.add<InfoCommand>();
+  p.add<SeriesCommand>();
+  p.add<RunCommand>();
+  p.add<PrepareCommand>();
+  p.add<RehearseCommand>();
+  p.add<ReplayCommand>();
+  p.add<DemoCommand>();
+  p.add<DocsCommand>();
+  return p;
 }
 
 }  // namespace osteo

@@ -59,7 +59,7 @@ cli::CommandInfo DocsCommand::info() {
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   int stale = 0;
-  const auto pages = cli::reference_pages(osteo_program());
+  const auto pages = cli::reference_pages(make_osteo_program());
   for (const auto& [name, content] : pages) {
     const fs::path path = folder / name;
     if (!p.check) {

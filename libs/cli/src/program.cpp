@@ -161,8 +161,92 @@ Command* Program::find(std::string_view name) const {
   return nullptr;
 }
 
+namespace {
+
+// Throws what went wrong; `printer` is the caller's, so that it can clear the bar before it prints an error.
+int dispatch(Program& program, std::vector<std::string> args, std::ostream& out, std::ostream& err, std::unique_ptr<ProgressPrinter>& printer) {
+  if (args.empty()) {
+    err << program_help(program);
+    return static_cast<int>(ExitCode::usage);
+  }
+  const std::string name = args.front();
+  args.erase(args.begin());
+  const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
+  if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
+    out << program_help(program);
+    return 0;
+  }
+  if (name == "--version") {
+    out << "osteo " << program_version() << "\n" << program.licence << "\n";
+    return 0;
+  }
+  const std::string subject = name == "help" ? args.front() : name;
+  Command* const command = program.find(subject);
+  if (command == nullptr && !program.registry.has(subject)) {
+    std::vector<std::string> known = program.registry.names();
+    for (const auto& c : program.commands) known.push_back(c->info().name);
+    known.emplace_back("help");
+    const std::string near = nearest_name(subject, known);
+    throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'", near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
+  }
+  if (name == "help" || wants_help) {
+    out << (command != nullptr ? command_help(*command) : stage_help(*program.registry.make(subject)));
+    return 0;
+  }
+  if (command == nullptr) {
+    const auto stage = program.registry.make(subject);
+    if (std::find(args.begin(), args.end(), "--xml") != args.end()) return out << stage_xml(*stage), 0;
+    if (std::find(args.begin(), args.end(), "--describe") != args.end()) return out << stage_json(*stage), 0;
+  }
+
+  Common::Params common;
+  Invocation invocation{program.registry, {}, {}, {}, {}, out, err, [] {}};
+  const auto ready = [&] {
+    printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
+    invocation.common = common;
+    invocation.context.threads = common.threads;
+    invocation.context.seed = static_cast<std::uint64_t>(common.seed);
+    invocation.context.set_cancel_flag(&g_cancel);
+    invocation.context.on_progress([&](double f, std::string_view a) { printer->update(f, a); });
+    invocation.context.on_log([&](LogLevel level, std::string_view text) {
+      printer->message(level == LogLevel::warning ? "warning: " + std::string(text) : std::string(text));
+    });
+    invocation.end_progress = [&] { printer->clear(); };
+  };
+  int code = 0;
+  // 'osteo import --list FOLDER' asks what is there; that is the verb 'series'.
+  if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() && program.find("series") != nullptr) {
+    args.erase(std::find(args.begin(), args.end(), "--list"));
+    Command* const series = program.find("series");
+    auto fields = series->fields();
+    for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
+    invocation.arguments = parse(args, fields, {}, false).positionals;
+    ready();
+    code = series->run(invocation);
+  } else if (command == nullptr) {
+    code = run_stage(program.registry, *program.registry.make(subject), args, invocation, common, ready);
+  } else {
+    auto fields = command->fields();
+    for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
+    Parsed parsed = parse(args, fields, {}, true);
+    const auto& wanted = command->info().positionals;
+    const auto required = static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
+    if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {
+      std::string list;
+      for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
+      throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list), "'osteo help " + subject + "' tells more");
+    }
+    invocation.arguments = std::move(parsed.positionals);
+    invocation.settings = std::move(parsed.settings);
+    ready();
+    code = command->run(invocation);
+  }
+  return code;
+}
+
+}  // namespace
+
 int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err) {
-  std::vector<std::string> args(argv + 1, argv + argc);
   struct sigaction action {};
   action.sa_handler = on_signal;
   ::sigaction(SIGINT, &action, nullptr);
@@ -170,82 +254,7 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   ::signal(SIGXFSZ, SIG_IGN);
   std::unique_ptr<ProgressPrinter> printer;
   try {
-    if (args.empty()) {
-      err << program_help(program);
-      return static_cast<int>(ExitCode::usage);
-    }
-    const std::string name = args.front();
-    args.erase(args.begin());
-    const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
-    if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
-      out << program_help(program);
-      return 0;
-    }
-    if (name == "--version") {
-      out << "osteo " << program_version() << "\n" << program.licence << "\n";
-      return 0;
-    }
-    const std::string subject = name == "help" ? args.front() : name;
-    Command* const command = program.find(subject);
-    if (command == nullptr && !program.registry.has(subject)) {
-      std::vector<std::string> known = program.registry.names();
-      for (const auto& c : program.commands) known.push_back(c->info().name);
-      known.emplace_back("help");
-      const std::string near = nearest_name(subject, known);
-      throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'", near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
-    }
-    if (name == "help" || wants_help) {
-      out << (command != nullptr ? command_help(*command) : stage_help(*program.registry.make(subject)));
-      return 0;
-    }
-    if (command == nullptr) {
-      const auto stage = program.registry.make(subject);
-      if (std::find(args.begin(), args.end(), "--xml") != args.end()) return out << stage_xml(*stage), 0;
-      if (std::find(args.begin(), args.end(), "--describe") != args.end()) return out << stage_json(*stage), 0;
-    }
-
-    Common::Params common;
-    Invocation invocation{program.registry, {}, {}, {}, {}, out, err, [] {}};
-    const auto ready = [&] {
-      printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
-      invocation.common = common;
-      invocation.context.threads = common.threads;
-      invocation.context.seed = static_cast<std::uint64_t>(common.seed);
-      invocation.context.set_cancel_flag(&g_cancel);
-      invocation.context.on_progress([&](double f, std::string_view a) { printer->update(f, a); });
-      invocation.context.on_log([&](LogLevel level, std::string_view text) {
-        printer->message(level == LogLevel::warning ? "warning: " + std::string(text) : std::string(text));
-      });
-      invocation.end_progress = [&] { printer->clear(); };
-    };
-    int code = 0;
-    // 'osteo import --list FOLDER' asks what is there; that is the verb 'series'.
-    if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() && program.find("series") != nullptr) {
-      args.erase(std::find(args.begin(), args.end(), "--list"));
-      Command* const series = program.find("series");
-      auto fields = series->fields();
-      for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
-      invocation.arguments = parse(args, fields, {}, false).positionals;
-      ready();
-      code = series->run(invocation);
-    } else if (command == nullptr) {
-      code = run_stage(program.registry, *program.registry.make(subject), args, invocation, common, ready);
-    } else {
-      auto fields = command->fields();
-      for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
-      Parsed parsed = parse(args, fields, {}, true);
-      const auto& wanted = command->info().positionals;
-      const auto required = static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
-      if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {
-        std::string list;
-        for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
-        throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list), "'osteo help " + subject + "' tells more");
-      }
-      invocation.arguments = std::move(parsed.positionals);
-      invocation.settings = std::move(parsed.settings);
-      ready();
-      code = command->run(invocation);
-    }
+    const int code = dispatch(program, {argv + 1, argv + argc}, out, err, printer);
     if (printer) printer->clear();
     out.flush();
     if (!out) throw Error(ExitCode::cannot_write, "standard output cannot be written");

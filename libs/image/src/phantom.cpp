@@ -20,7 +20,7 @@ constexpr Vec3 kMastoid{57, 24, -26}, kMastoidRadii{15, 19, 24};
 constexpr Vec3 kPetrous{34, 10, -20}, kPetrousRadii{27, 9, 10};
 constexpr Vec3 kMiddleEar{42, 3, -19}, kMiddleEarRadii{4, 6, 7};
 constexpr Vec3 kMarker{72, -8, 45};
-constexpr double kCellPitch = 5.0, kCellRadius = 2.1;
+constexpr double kCellPitch = 5.5, kCellRadius = 1.7;
 constexpr double kMastoidCortex = 2.5;
 
 // Left side; the right is its mirror image.

@@ -43,6 +43,7 @@ bool contains(const std::string& text, std::string_view part) { return text.find
 
 vtkSmartPointer<vtkDICOMMetaData> read_header(const fs::path& file) {
   require_readable(file);
+  const QuietVtk quiet;
   vtkNew<vtkDICOMParser> parser;
   auto meta = vtkSmartPointer<vtkDICOMMetaData>::New();
   parser->SetMetaData(meta);

@@ -16,6 +16,7 @@
 #include <vtkShortArray.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <atomic>
 #include <mutex>
 
 #include "osteo/base/error.h"
@@ -55,6 +56,9 @@ vtkSmartPointer<vtkImageData> wrap(const Volume<T>& volume, const char* name) {
   image->GetPointData()->SetScalars(array);
   return image;
 }
+
+// QuietVtks nest: only the outermost lets VTK's logger speak again.
+std::atomic<int> g_quiet_depth{0};
 
 // Collects text instead of showing it.
 class Collector : public vtkOutputWindow {
@@ -138,13 +142,13 @@ struct QuietVtk::Impl {
 };
 
 QuietVtk::QuietVtk() : impl_(std::make_unique<Impl>()) {
-  vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
+  if (g_quiet_depth++ == 0) vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
   impl_->before = vtkOutputWindow::GetInstance();
   vtkOutputWindow::SetInstance(impl_->collector);
 }
 QuietVtk::~QuietVtk() {
   vtkOutputWindow::SetInstance(impl_->before);
-  vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_WARNING);
+  if (--g_quiet_depth == 0) vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_WARNING);
 }
 
 std::string QuietVtk::first_message() const {

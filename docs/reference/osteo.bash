@@ -1,0 +1,39 @@
+# bash completion of osteo: source it, or put it into /etc/bash_completion.d
+_osteo() {
+  local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
+  if [ "$COMP_CWORD" -eq 1 ]; then
+    COMPREPLY=($(compgen -W "import threshold resample surface snapshot phantom list info series run prepare rehearse replay demo docs help --version" -- "$cur"))
+    return
+  fi
+  case "${COMP_WORDS[1]} $prev" in
+    "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
+    "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
+    "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
+    "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
+    "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
+    "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
+  esac
+  local flags="--threads --force --quiet --json --progress --seed --help"
+  case "${COMP_WORDS[1]}" in
+    import) flags="$flags --xml --describe --series --max-gap-mm --axes" ;;
+    threshold) flags="$flags --xml --describe --lower --upper --core --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
+    resample) flags="$flags --xml --describe --spacing-mm --lower --hu-out" ;;
+    surface) flags="$flags --xml --describe --method --iso" ;;
+    snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --title --mask --surface" ;;
+    phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --seed --labels-out" ;;
+    list) flags="$flags" ;;
+    info) flags="$flags" ;;
+    series) flags="$flags" ;;
+    run) flags="$flags --validate --dry-run --reuse" ;;
+    prepare) flags="$flags --out --lower --spacing-mm --series --axes --pipeline" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --side --seconds --rate-hz --fast --resume" ;;
+    replay) flags="$flags --case-folder --surface-out --bone-out" ;;
+    demo) flags="$flags --out --seconds --axes" ;;
+    docs) flags="$flags --check" ;;
+  esac
+  case "$cur" in
+    -*) COMPREPLY=($(compgen -W "$flags" -- "$cur")) ;;
+    *) COMPREPLY=($(compgen -f -- "$cur")) ;;
+  esac
+}
+complete -o filenames -F _osteo osteo ./osteo

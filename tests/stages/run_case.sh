@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Runs one line of a .cases file in a fresh folder. usage: run_case.sh FILE NAME BIN_DIR FIXTURES SOURCE_DIR
+# A line is "name | shell commands"; it passes when the commands exit with 0. Helpers:
+#   fails CODE 'text' command...   the command must exit with CODE and print the text on standard error
+#   same A B                       the files must be equal byte for byte
+#   value FILE key                 a top-level key of a JSON file
+set -euo pipefail
+file=$1 name=$2 bin=$3 fixtures=$4 source=$5
+PATH=$bin:$PATH
+line=$(grep -E "^$name *\|" "$file" | head -n 1)
+[ -n "$line" ] || { echo "no case '$name' in $file"; exit 1; }
+work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-case-XXXXXX")
+trap 'chmod -R u+rwx "$work" 2>/dev/null; rm -rf "$work"' EXIT
+cd "$work"
+fails() {
+  local code=$1 text=$2 got=0
+  shift 2
+  "$@" >stdout.txt 2>stderr.txt || got=$?
+  [ "$got" -eq "$code" ] || { echo "exit code $got, not $code: $*"; cat stderr.txt; exit 1; }
+  grep -qF -- "$text" stderr.txt || { echo "standard error does not say '$text':"; cat stderr.txt; exit 1; }
+  ! grep -qE 'ERR\||terminate called|Segmentation' stderr.txt || { echo "noise on standard error:"; cat stderr.txt; exit 1; }
+}
+same() { cmp "$1" "$2"; }
+value() { python3 -c 'import json,sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"; }
+export -f fails same value
+eval "${line#*|}"

@@ -1,0 +1,98 @@
+// The main job against exact truth: the phantom.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "osteo/grid/brick_grid.h"
+#include "osteo/grid/resample.h"
+#include "osteo/image/phantom.h"
+#include "osteo/image/threshold.h"
+#include "osteo/mesh/bone_surface.h"
+#include "osteo/scene/rehearsal.h"
+
+namespace osteo {
+namespace {
+
+struct Job {
+  Phantom phantom;
+  ResampledBone bone;
+  BoneSurface nets;
+};
+
+const Job& head() {
+  static const Job job = [] {
+    Job j;
+    PhantomParams p;
+    p.spacing_mm = 0.8;
+    j.phantom = make_phantom(p);
+    ThresholdParams t;
+    t.lower = 500;  // half-way between the phantom's bone and what is around it
+    ResampleParams r;
+    r.lower = 500;
+    j.bone = resample_bone(j.phantom.ct, threshold(j.phantom.ct, t), r);
+    j.nets = surface_nets(to_bricks(j.bone.density));
+    return j;
+  }();
+  return job;
+}
+
+TEST(Truth, VolumeOfBoneWithinOnePercentOfTheExactLabels) {
+  const auto& labels = head().phantom.labels;
+  double exact = 0;
+  for (const auto l : labels.span()) exact += is_bone(static_cast<Tissue>(l)) ? labels.frame.voxel_volume_mm3() : 0;
+  EXPECT_NEAR(exact / head().phantom.bone_mm3, 1, 0.01);  // labels and 27 samples a voxel agree on the truth
+  EXPECT_NEAR(head().bone.volume_after_mm3 / exact, 1, 0.01);
+  EXPECT_NEAR(head().bone.volume_after_mm3 / head().bone.volume_before_mm3, 1, 0.01);
+  EXPECT_NEAR(enclosed_volume_mm3(head().nets.mesh) / exact, 1, 0.01);
+  std::printf("bone: exact labels %.0f mm3, 27 samples a voxel %.0f, mask %.0f, grid %.0f, surface %.0f\n", exact, head().phantom.bone_mm3, head().bone.volume_before_mm3,
+              head().bone.volume_after_mm3, enclosed_volume_mm3(head().nets.mesh));
+}
+
+// Distance of a surface point to the exact boundary along its normal, by bisection; at most 3 mm is looked for.
+double distance_to_boundary(Vec3 p, Vec3 n) {
+  const bool inside = is_bone(phantom_tissue(p));
+  for (double d = 0.05; d <= 3; d += 0.05) {
+    for (const double s : {d, -d}) {
+      if (is_bone(phantom_tissue(p + n * s)) == inside) continue;
+      double lo = d - 0.05, hi = d;
+      for (int i = 0; i < 20; ++i) {
+        const double mid = (lo + hi) / 2;
+        (is_bone(phantom_tissue(p + n * (s > 0 ? mid : -mid))) == inside ? lo : hi) = mid;
+      }
+      return hi;
+    }
+  }
+  return 3;
+}
+
+TEST(Truth, SurfaceWithinHalfAVoxelOfTheExactBoundary) {
+  const auto& mesh = head().nets.mesh;
+  double sum = 0;
+  std::vector<double> all;
+  for (std::size_t v = 0; v < mesh.points_mm.size(); v += 37) {
+    const auto& p = mesh.points_mm[v];
+    const auto& n = mesh.normals[v];
+    all.push_back(distance_to_boundary({p[0], p[1], p[2]}, {n[0], n[1], n[2]}));
+    sum += all.back();
+  }
+  std::sort(all.begin(), all.end());
+  const double mean_voxels = sum / static_cast<double>(all.size()) / 0.5;
+  std::printf("surface to exact boundary, voxels of 0.5 mm: mean %.3f, p95 %.3f, p99 %.3f (%zu points; CT voxels of 0.8 mm)\n", mean_voxels,
+              all[all.size() * 95 / 100] / 0.5, all[all.size() * 99 / 100] / 0.5, all.size());
+  EXPECT_LT(mean_voxels, 0.5);
+  EXPECT_TRUE(check(mesh).watertight());
+  EXPECT_TRUE(check(mesh).manifold());
+}
+
+TEST(Truth, DefaultStrokesDrillTheChosenSide) {
+  const BrickGrid bone = to_bricks(head().bone.density);
+  for (const bool left : {true, false}) {
+    const Script s = make_default_script(bone, left, 3, 5);
+    for (const auto& w : s.waypoints) EXPECT_GT(w.at_mm.x * (left ? 1 : -1), 30);
+    Rehearsal rehearsal(BrickGrid(bone), std::make_unique<ScriptedDevice>(s, 1000), {}, {});
+    EXPECT_GT(rehearsal.run_to_end({}).removed_mm3, 5);
+  }
+}
+
+}  // namespace
+}  // namespace osteo
