@@ -1,5 +1,7 @@
 #include "vdb.h"
 
+#include <openvdb/tools/Prune.h>
+
 #include <mutex>
 
 #include "osteo/base/error.h"
@@ -16,6 +18,7 @@ void initialize_vdb() {
 }
 
 SparseGrid wrap(openvdb::FloatGrid::Ptr vdb, const Frame& frame, std::string name) {
+  openvdb::tools::prune(vdb->tree());  // solid bone becomes tiles of 8^3
   SparseGrid result;
   result.name = std::move(name);
   result.frame = frame;
@@ -66,7 +69,8 @@ Frame frame_of(const openvdb::FloatGrid& grid) {
 }  // namespace
 
 BrickGrid to_bricks(const SparseGrid& sparse) {
-  const auto& tree = sparse.impl->grid->tree();
+  openvdb::FloatTree tree(sparse.impl->grid->tree());
+  tree.voxelizeActiveTiles();
   std::vector<Ijk> bricks;
   const auto holds_value = [](const auto& leaf) {
     for (auto v = leaf.cbeginValueOn(); v; ++v) {
