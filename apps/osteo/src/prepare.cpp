@@ -39,7 +39,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   fs::create_directories(folder, ec);
   if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message(), "choose a folder that you may write to");
   try {
-    const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = true}, io.context);
+    const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = !io.common.force}, io.context);
     write_manifest(folder, name, results);
     io.end_progress();
     cli::print_results(results, io);

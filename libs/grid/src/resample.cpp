@@ -19,6 +19,8 @@ constexpr int kVoxels = BrickGrid::kVoxels;
 // boundary by much, one HU would put a fill's boundary on its voxel centres.
 constexpr float kForcedHu = 100;
 
+constexpr float kTrace = 1.0F / 256;
+
 // HU above the boundary, negative outside bone.
 std::vector<float> signed_field(const Image& ct, const Labels& mask, double lower) {
   std::vector<float> field(ct.frame.voxel_count());
@@ -29,12 +31,13 @@ std::vector<float> signed_field(const Image& ct, const Labels& mask, double lowe
   return field;
 }
 
-// Where the sample points of the output lie between the samples of the CT, along one axis.
+// How the samples of the output lie between the samples of the CT along one axis: four taps of a cubic (Catmull-Rom) each.
+// R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981.
 struct AxisMap {
-  int sub = 1;                  // sub-voxels along an output voxel
-  std::vector<int> i0, i1;      // CT neighbours, one pair a sub-voxel
-  std::vector<float> t;         // weight of i1
-  std::vector<float> slope;     // of t per mm; 0 where clamped at the border
+  int sub = 1;                                // sub-voxels along an output voxel
+  std::vector<int> first;                     // CT index of the first tap; may lie outside, where the border repeats
+  std::vector<std::array<float, 4>> weight;   // of the value
+  std::vector<std::array<float, 4>> slope;    // of the change across the sub-voxel
 };
 
 AxisMap make_axis(int ct_dim, double ct_spacing, int out_dim, double out_spacing) {
@@ -42,16 +45,22 @@ AxisMap make_axis(int ct_dim, double ct_spacing, int out_dim, double out_spacing
   m.sub = std::max(1, static_cast<int>(std::ceil(out_spacing / ct_spacing - 1e-6)));
   const double h = out_spacing / m.sub;
   for (int s = 0; s < out_dim * m.sub; ++s) {
-    const double x = (-0.5 * ct_spacing + (s + 0.5) * h) / ct_spacing;
-    const int i = std::clamp(static_cast<int>(std::floor(x)), 0, std::max(0, ct_dim - 2));
-    const double t = std::clamp(x - i, 0.0, 1.0);
-    m.i0.push_back(i);
-    m.i1.push_back(std::min(i + 1, ct_dim - 1));
-    m.t.push_back(static_cast<float>(t));
-    m.slope.push_back(t == x - i && ct_dim > 1 ? static_cast<float>(1 / ct_spacing) : 0.0F);
+    const double x = std::clamp((-0.5 * ct_spacing + (s + 0.5) * h) / ct_spacing, -0.5, ct_dim - 0.5);
+    const int i = static_cast<int>(std::floor(x));
+    const double t = x - i, per_mm = h / ct_spacing;
+    m.first.push_back(i - 1);
+    m.weight.push_back({static_cast<float>(t * (-0.5 + t * (1 - 0.5 * t))), static_cast<float>(1 + t * t * (1.5 * t - 2.5)),
+                        static_cast<float>(t * (0.5 + t * (2 - 1.5 * t))), static_cast<float>(t * t * (0.5 * t - 0.5))});
+    m.slope.push_back({static_cast<float>(per_mm * (-0.5 + t * (2 - 1.5 * t))), static_cast<float>(per_mm * t * (4.5 * t - 5)),
+                       static_cast<float>(per_mm * (0.5 + t * (4 - 4.5 * t))), static_cast<float>(per_mm * t * (1.5 * t - 1))});
   }
   return m;
 }
+
+// Memory for one brick's samples, kept between bricks.
+struct Scratch {
+  std::vector<float> ct, x, dx, y, dy, xy;
+};
 
 class Resampler {
  public:
@@ -74,42 +83,70 @@ class Resampler {
   [[nodiscard]] const std::vector<Ijk>& bricks() const { return bricks_; }
 
   // Calls take(voxel in brick, signed HU, HU of a full ramp across the sub-voxel, weight) for each sub-voxel of a brick.
+  // Separable: first along x for the CT rows that the brick needs, then along y, then along z.
   template <class F>
-  void sample_brick(Ijk brick, F&& take) const {
-    const auto nx = static_cast<std::size_t>(ct_.frame.dims[0]), ny = static_cast<std::size_t>(ct_.frame.dims[1]);
-    const auto &ax = axis_[0], &ay = axis_[1], &az = axis_[2];
-    const float weight = 1.0F / static_cast<float>(ax.sub * ay.sub * az.sub);
-    const float hx = static_cast<float>(h_ / ax.sub), hy = static_cast<float>(h_ / ay.sub), hz = static_cast<float>(h_ / az.sub);
-    const auto limit = [&](std::size_t a, int b) { return std::min(kEdge, frame_.dims[a] - b * kEdge); };
-    for (int k = 0; k < limit(2, brick.k) * az.sub; ++k) {
-      const auto sk = static_cast<std::size_t>(brick.k * kEdge * az.sub + k);
-      const std::size_t z0 = static_cast<std::size_t>(az.i0[sk]) * ny, z1 = static_cast<std::size_t>(az.i1[sk]) * ny;
-      const float tz = az.t[sk];
-      for (int j = 0; j < limit(1, brick.j) * ay.sub; ++j) {
-        const auto sj = static_cast<std::size_t>(brick.j * kEdge * ay.sub + j);
-        const auto y0 = static_cast<std::size_t>(ay.i0[sj]), y1 = static_cast<std::size_t>(ay.i1[sj]);
-        const float ty = ay.t[sj];
-        const float* const r00 = field_.data() + (z0 + y0) * nx;
-        const float* const r10 = field_.data() + (z0 + y1) * nx;
-        const float* const r01 = field_.data() + (z1 + y0) * nx;
-        const float* const r11 = field_.data() + (z1 + y1) * nx;
-        for (int i = 0; i < limit(0, brick.i) * ax.sub; ++i) {
-          const auto si = static_cast<std::size_t>(brick.i * kEdge * ax.sub + i);
-          const auto x0 = static_cast<std::size_t>(ax.i0[si]), x1 = static_cast<std::size_t>(ax.i1[si]);
-          const float tx = ax.t[si];
-          const float c00 = r00[x0] + (r00[x1] - r00[x0]) * tx, c10 = r10[x0] + (r10[x1] - r10[x0]) * tx;
-          const float c01 = r01[x0] + (r01[x1] - r01[x0]) * tx, c11 = r11[x0] + (r11[x1] - r11[x0]) * tx;
-          const float c0 = c00 + (c10 - c00) * ty, c1 = c01 + (c11 - c01) * ty;
-          const float value = c0 + (c1 - c0) * tz;
-          // The trilinear gradient, as the change across the sub-voxel along each axis.
-          const float gz = (c1 - c0) * az.slope[sk] * hz;
-          const float gy = ((c10 - c00) + ((c11 - c01) - (c10 - c00)) * tz) * ay.slope[sj] * hy;
-          const float d0 = (r00[x1] - r00[x0]) + ((r10[x1] - r10[x0]) - (r00[x1] - r00[x0])) * ty;
-          const float d1 = (r01[x1] - r01[x0]) + ((r11[x1] - r11[x0]) - (r01[x1] - r01[x0])) * ty;
-          const float gx = (d0 + (d1 - d0) * tz) * ax.slope[si] * hx;
+  void sample_brick(Ijk brick, Scratch& scratch, F&& take) const {
+    const std::array<int, 3> b{brick.i, brick.j, brick.k};
+    std::array<std::size_t, 3> begin{}, count{};  // samples of the brick along each axis
+    std::array<int, 3> lo{}, n{};                 // CT voxels they need
+    for (std::size_t a = 0; a < 3; ++a) {
+      begin[a] = static_cast<std::size_t>(b[a] * kEdge * axis_[a].sub);
+      count[a] = static_cast<std::size_t>(std::min(kEdge, frame_.dims[a] - b[a] * kEdge) * axis_[a].sub);
+      lo[a] = axis_[a].first[begin[a]];
+      n[a] = axis_[a].first[begin[a] + count[a] - 1] + 4 - lo[a];
+    }
+    const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]), nz = static_cast<std::size_t>(n[2]);
+    const auto inside = [&](std::size_t a, int i) { return static_cast<std::size_t>(std::clamp(i, 0, ct_.frame.dims[a] - 1)); };
+    scratch.ct.resize(nx * ny * nz);
+    for (std::size_t k = 0; k < nz; ++k) {
+      for (std::size_t j = 0; j < ny; ++j) {
+        const float* const row = field_.data() + (inside(2, lo[2] + static_cast<int>(k)) * static_cast<std::size_t>(ct_.frame.dims[1]) + inside(1, lo[1] + static_cast<int>(j))) *
+                                                     static_cast<std::size_t>(ct_.frame.dims[0]);
+        for (std::size_t i = 0; i < nx; ++i) scratch.ct[(k * ny + j) * nx + i] = row[inside(0, lo[0] + static_cast<int>(i))];
+      }
+    }
+    scratch.x.resize(count[0] * ny * nz);
+    scratch.dx.resize(scratch.x.size());
+    for (std::size_t row = 0; row < ny * nz; ++row) {
+      for (std::size_t i = 0; i < count[0]; ++i) {
+        const float* const p = scratch.ct.data() + row * nx + static_cast<std::size_t>(axis_[0].first[begin[0] + i] - lo[0]);
+        const auto &w = axis_[0].weight[begin[0] + i], &d = axis_[0].slope[begin[0] + i];
+        scratch.x[row * count[0] + i] = p[0] * w[0] + p[1] * w[1] + p[2] * w[2] + p[3] * w[3];
+        scratch.dx[row * count[0] + i] = p[0] * d[0] + p[1] * d[1] + p[2] * d[2] + p[3] * d[3];
+      }
+    }
+    const std::size_t plane = count[0] * count[1];
+    for (auto* v : {&scratch.y, &scratch.dy, &scratch.xy}) v->resize(plane * nz);
+    for (std::size_t k = 0; k < nz; ++k) {
+      for (std::size_t j = 0; j < count[1]; ++j) {
+        const std::size_t from = (k * ny + static_cast<std::size_t>(axis_[1].first[begin[1] + j] - lo[1])) * count[0];
+        const auto &w = axis_[1].weight[begin[1] + j], &d = axis_[1].slope[begin[1] + j];
+        for (std::size_t i = 0; i < count[0]; ++i) {
+          const float *const p = scratch.x.data() + from + i, *const q = scratch.dx.data() + from + i;
+          const std::size_t at = k * plane + j * count[0] + i;
+          const std::size_t s1 = count[0], s2 = 2 * s1, s3 = 3 * s1;
+          scratch.y[at] = p[0] * w[0] + p[s1] * w[1] + p[s2] * w[2] + p[s3] * w[3];
+          scratch.dy[at] = p[0] * d[0] + p[s1] * d[1] + p[s2] * d[2] + p[s3] * d[3];
+          scratch.xy[at] = q[0] * w[0] + q[s1] * w[1] + q[s2] * w[2] + q[s3] * w[3];
+        }
+      }
+    }
+    const float share = 1.0F / static_cast<float>(axis_[0].sub * axis_[1].sub * axis_[2].sub);
+    for (std::size_t k = 0; k < count[2]; ++k) {
+      const std::size_t from = static_cast<std::size_t>(axis_[2].first[begin[2] + k] - lo[2]) * plane;
+      const auto &w = axis_[2].weight[begin[2] + k], &d = axis_[2].slope[begin[2] + k];
+      const auto along_z = [&](const std::vector<float>& v, std::size_t at, const std::array<float, 4>& c) {
+        const float* const p = v.data() + from + at;
+        return p[0] * c[0] + p[plane] * c[1] + p[2 * plane] * c[2] + p[3 * plane] * c[3];
+      };
+      for (std::size_t j = 0; j < count[1]; ++j) {
+        for (std::size_t i = 0; i < count[0]; ++i) {
+          const std::size_t at = j * count[0] + i;
+          const float value = along_z(scratch.y, at, w);
+          const float gx = along_z(scratch.xy, at, w), gy = along_z(scratch.dy, at, w), gz = along_z(scratch.y, at, d);
           // A plane cuts a cube over a width between the 2-norm and the 1-norm of this change.
           const float ramp = 0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
-          take(BrickGrid::offset_in_brick(i / ax.sub, j / ay.sub, k / az.sub), value, std::max(ramp, 1e-3F), weight);
+          take(BrickGrid::offset_in_brick(static_cast<int>(i) / axis_[0].sub, static_cast<int>(j) / axis_[1].sub, static_cast<int>(k) / axis_[2].sub), value, std::max(ramp, 1e-3F), share);
         }
       }
     }
@@ -156,8 +193,8 @@ class Resampler {
     for (std::size_t a = 0; a < 3; ++a) n[a] = (frame_.dims[a] + kEdge - 1) / kEdge;
     const auto range = [&](std::size_t a, int b) {
       const auto& m = axis_[a];
-      const int last = std::min((b + 1) * kEdge, frame_.dims[a]) * m.sub - 1;
-      return std::pair{m.i0[static_cast<std::size_t>(b * kEdge * m.sub)] / kBlock, m.i1[static_cast<std::size_t>(last)] / kBlock};
+      const int last = std::min((b + 1) * kEdge, frame_.dims[a]) * m.sub - 1, top = ct_.frame.dims[a] - 1;
+      return std::pair{std::clamp(m.first[static_cast<std::size_t>(b * kEdge * m.sub)], 0, top) / kBlock, std::clamp(m.first[static_cast<std::size_t>(last)] + 3, 0, top) / kBlock};
     };
     for (int k = 0; k < n[2]; ++k) {
       for (int j = 0; j < n[1]; ++j) {
@@ -200,10 +237,11 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
   std::vector<std::array<double, kOffsets.size()>> volumes(bricks.size());
   parallel_for(bricks.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
+    Scratch scratch;
     for (std::size_t b = begin; b < end; ++b) {
       auto& v = volumes[b];
       v.fill(0);
-      resampler.sample_brick(bricks[b], [&](std::uint32_t, float value, float ramp, float weight) {
+      resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t, float value, float ramp, float weight) {
         if (value - kOffsets.front() < -0.5F * ramp) return;
         for (std::size_t o = 0; o < kOffsets.size(); ++o) v[o] += static_cast<double>(weight * coverage(value, ramp, kOffsets[o]));
       });
@@ -248,14 +286,17 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   std::vector<std::unique_ptr<float[]>> densities(bricks.size()), values(bricks.size());
   parallel_for(bricks.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
+    Scratch scratch;
     for (std::size_t b = begin; b < end; ++b) {
       std::array<float, kVoxels> d{};
-      resampler.sample_brick(bricks[b], [&](std::uint32_t v, float value, float ramp, float weight) { d[v] += weight * coverage(value, ramp, offset); });
+      resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t v, float value, float ramp, float weight) { d[v] += weight * coverage(value, ramp, offset); });
+      // Traces are not worth a brick, nor is what a trace lacks to solid bone.
+      for (float& x : d) x = x < kTrace ? 0 : x > 1 - kTrace ? 1 : x;
       if (std::none_of(d.begin(), d.end(), [](float x) { return x > 0; })) continue;
       densities[b] = std::make_unique_for_overwrite<float[]>(kVoxels);
       values[b] = std::make_unique<float[]>(kVoxels);
       for (std::uint32_t v = 0; v < kVoxels; ++v) {
-        densities[b][v] = std::min(d[v], 1.0F);
+        densities[b][v] = d[v];
         if (d[v] > 0) values[b][v] = resampler.hu_at(bricks[b], v);
       }
     }
@@ -304,7 +345,7 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
 
 StageInfo ResampleStage::info() {
   return {.name = "resample",
-          .version = 1,
+          .version = 2,
           .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
           .description =
               "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "
@@ -313,7 +354,7 @@ StageInfo ResampleStage::info() {
           .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
                       {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
-                         "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
+                         "R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981", "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
           .example = "osteo resample ct.nrrd bone.nrrd bone.vdb --spacing-mm 0.5"};
 }
 

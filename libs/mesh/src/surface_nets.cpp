@@ -120,12 +120,9 @@ unsigned cell_mask(const Block& b, int i, int j, int k, float iso) {
   return mask;
 }
 
-std::array<float, 3> gradient(const Block& b, int i, int j, int k) {
-  return {b.at(i + 1, j, k) - b.at(i - 1, j, k), b.at(i, j + 1, k) - b.at(i, j - 1, k), b.at(i, j, k + 1) - b.at(i, j, k - 1)};
-}
-
 struct CellSheets {
   Sheets sheets{};
+  std::uint8_t mask = 0, flipped_faces = 0;
   bool ready = false;
 };
 
@@ -178,6 +175,7 @@ class PatchBuilder {
     if (cell.ready) return cell.sheets;
     cell.ready = true;
     const unsigned mask = cell_mask(block_, i, j, k, iso_);
+    cell.mask = static_cast<std::uint8_t>(mask);
     const unsigned doubled = tables().doubled[mask];
     unsigned flip = 0;
     for (unsigned f = 0; doubled != 0 && f < 6; ++f) {
@@ -186,8 +184,45 @@ class PatchBuilder {
       const unsigned other = cell_mask(block_, i + (f / 2 == 0 ? d : 0), j + (f / 2 == 1 ? d : 0), k + (f / 2 == 2 ? d : 0), iso_);
       if ((tables().doubled[other] >> (f ^ 1U) & 1) != 0) flip |= 1U << f;
     }
+    cell.flipped_faces = static_cast<std::uint8_t>(flip);
     cell.sheets = flip == 0 ? tables().sheets[mask] : sheets_of(mask, flip);
     return cell.sheets;
+  }
+
+  // The area vector of the polygon in which a sheet cuts the faces of its cell. It needs no neighbours, so both sides of a
+  // wall one voxel thin get their own; density gradients would cancel there.
+  static std::array<float, 3> sheet_normal(const CellSheets& cell, std::uint8_t sheet, const std::array<std::array<float, 3>, 12>& crossing) {
+    std::array<float, 3> area{0, 0, 0};
+    for (unsigned f = 0; f < 6; ++f) {
+      const auto& c = kFaces[f];
+      std::array<std::size_t, 4> edge{};
+      std::array<bool, 4> leaves_bone{};
+      int count = 0;
+      for (std::size_t n = 0; n < 4; ++n) {
+        const bool here = (cell.mask >> c[n] & 1) != 0, next = (cell.mask >> c[(n + 1) % 4] & 1) != 0;
+        if (here == next) continue;
+        edge[static_cast<std::size_t>(count)] = static_cast<std::size_t>(edge_between(c[n], c[(n + 1) % 4]));
+        leaves_bone[static_cast<std::size_t>(count++)] = here;
+      }
+      // Arcs as in sheets_of: a face with two crossings has one, an ambiguous face two.
+      const auto add_arc = [&](std::size_t a, std::size_t b) {
+        if (cell.sheets[edge[a]] != sheet) return;
+        const bool counter_clockwise = ((f & 1) != 0) != (f / 2 == 1);  // the face's corners, seen from outside the cell
+        const bool forward = leaves_bone[a] != counter_clockwise;
+        const auto &p = crossing[edge[forward ? a : b]], &q = crossing[edge[forward ? b : a]];
+        for (std::size_t x = 0; x < 3; ++x) area[x] += p[(x + 1) % 3] * q[(x + 2) % 3] - p[(x + 2) % 3] * q[(x + 1) % 3];
+      };
+      if (count == 2) add_arc(0, 1);
+      if (count == 4) {
+        const bool first_is_centre = ((cell.mask >> c[0] & 1) != 0) != ((cell.flipped_faces >> f & 1) != 0);
+        add_arc(first_is_centre ? 3 : 0, first_is_centre ? 0 : 1);
+        add_arc(first_is_centre ? 1 : 2, first_is_centre ? 2 : 3);
+      }
+    }
+    const float n = std::sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
+    if (!(n > 1e-12F)) return {0, 0, 1};
+    for (float& x : area) x /= n;
+    return area;
   }
 
   static std::size_t cell_index(int i, int j, int k) { return static_cast<std::size_t>(((k + 1) * kCells + j + 1) * kCells + i + 1); }
@@ -197,32 +232,21 @@ class PatchBuilder {
     const std::uint8_t sheet = sheets[static_cast<std::size_t>(edge)];
     std::uint32_t& vertex = vertex_of_[cell_index(i, j, k) * 12 + sheet];
     if (vertex != kNoVertex) return vertex;
-    std::array<float, 3> sum{0, 0, 0};
+    std::array<std::array<float, 3>, 12> crossing;
+    std::array<float, 3> at{0, 0, 0};
     float count = 0;
     for (std::size_t e = 0; e < 12; ++e) {
       if (sheets[e] != sheet) continue;
       const int a = kEdges[e].from, b = kEdges[e].to;
       const float va = block_.at(i + (a & 1), j + (a >> 1 & 1), k + (a >> 2));
       const float vb = block_.at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
-      const float t = (iso_ - va) / (vb - va);
-      std::array<float, 3> p{static_cast<float>(a & 1), static_cast<float>(a >> 1 & 1), static_cast<float>(a >> 2)};
-      p[e / 4] += t;
-      for (std::size_t x = 0; x < 3; ++x) sum[x] += p[x];
+      crossing[e] = {static_cast<float>(a & 1), static_cast<float>(a >> 1 & 1), static_cast<float>(a >> 2)};
+      crossing[e][e / 4] += (iso_ - va) / (vb - va);
+      for (std::size_t x = 0; x < 3; ++x) at[x] += crossing[e][x];
       count += 1;
     }
-    // Normal: against the gradient, the mean of the central differences at the corners weighted to the vertex.
-    std::array<float, 3> at{sum[0] / count, sum[1] / count, sum[2] / count}, g{0, 0, 0};
-    for (int c = 0; c < 8; ++c) {
-      const float w = ((c & 1) != 0 ? at[0] : 1 - at[0]) * ((c & 2) != 0 ? at[1] : 1 - at[1]) * ((c & 4) != 0 ? at[2] : 1 - at[2]);
-      const auto d = gradient(block_, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-      for (std::size_t x = 0; x < 3; ++x) g[x] -= w * d[x];
-    }
-    const float n = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    if (n > 1e-12F) {
-      for (float& x : g) x /= n;
-    } else {
-      g = {0, 0, 1};
-    }
+    for (float& x : at) x /= count;
+    const std::array<float, 3> g = sheet_normal(cells_[cell_index(i, j, k)], sheet, crossing);
     const Ijk cell{base_.i + i, base_.j + j, base_.k + k};
     const auto part = [](int x) { return static_cast<std::uint64_t>(x + 1); };
     const std::uint64_t key = ((part(cell.k) << 20 | part(cell.j)) << 20 | part(cell.i)) << 4 | sheet;

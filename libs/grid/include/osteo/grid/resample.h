@@ -19,7 +19,7 @@ struct ResampledBone {
 
 /// Isotropic voxels along the axes of the CT.
 ///
-/// The bone boundary is where the interpolated HU crosses `lower`, not the steps of the mask: the mask only decides which
+/// The bone boundary is where the interpolated HU (cubic) crosses `lower`, not the steps of the mask: the mask only decides which
 /// bone is kept. Voxels that the mask adds (closing, filling) or takes away (small pieces) count as just inside or outside.
 /// The boundary's offset is then set (a few HU at most, reported) so that the bone keeps the mask's volume; see docs.
 /// A voxel's density is the share of it inside, from the signed HU distance to the boundary over its gradient; coarser
