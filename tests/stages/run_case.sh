@@ -22,5 +22,5 @@ fails() {
 }
 same() { cmp "$1" "$2"; }
 value() { python3 -c 'import json,sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"; }
-export -f fails same value
+export -f fails same value; export fixtures PATH
 eval "${line#*|}"

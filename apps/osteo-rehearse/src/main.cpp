@@ -42,7 +42,11 @@ struct WindowCommand {
     visit({"height", "of the window", "pixels", 480, 8192}, p.height);
   }
   static cli::CommandInfo info() {
-    return {"rehearse", "drill the bone of a case in a window", "The same as 'osteo rehearse CASE'.", {{"case", "a folder made by prepare"}}, "osteo-rehearse CASE"};
+    return {"rehearse",
+            "drill the bone of a case in a window",
+            "The same as 'osteo rehearse CASE'.",
+            {{"case", "a folder made by prepare"}},
+            "osteo-rehearse CASE"};
   }
 
   static int run(const Params& p, cli::Invocation& io) {
@@ -70,7 +74,8 @@ struct WindowCommand {
       const RehearsalSummary s = rehearsal->stop();
       write_summary(session, s, p.rate_hz, "window");
       resume_from = session.folder;
-      if (!io.common.quiet) io.err << "session: " << session.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)\n";
+      if (!io.common.quiet)
+        io.err << "session: " << session.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)\n";
     };
     actions.rehearsal = [&]() -> Rehearsal& { return *rehearsal; };
     actions.folder = [&] { return session.folder; };
@@ -90,7 +95,9 @@ struct WindowCommand {
       throw;
     }
     actions.save();
-    if (gl_errors > 0) throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen; the session is saved", "please report this with the name of the graphics card");
+    if (gl_errors > 0)
+      throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen; the session is saved",
+                  "please report this with the name of the graphics card");
     return 0;
   }
 };

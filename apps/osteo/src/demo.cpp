@@ -10,9 +10,12 @@
 namespace osteo {
 
 cli::CommandInfo DemoCommand::info() {
-  return {"demo", "the whole way once: CT, case, drilled session, pictures",
-          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, and a replay that must come out the same.",
-          {{"source", "DICOM folder or volume file", true}}, "osteo demo"};
+  return {"demo",
+          "the whole way once: CT, case, drilled session, pictures",
+          "With no CT given it makes one (a phantom head, as DICOM). Then prepare, a headless rehearsal by the clock, and a replay that "
+          "must come out the same.",
+          {{"source", "DICOM folder or volume file", true}},
+          "osteo demo"};
 }
 
 int DemoCommand::run(const Params& p, cli::Invocation& io) {
@@ -50,8 +53,8 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
   say("replaying the session");
   io.arguments = {session.string()};
   const int code = ReplayCommand::run({}, io);
-  say("done; look at\n   " + (out / "case/preview.png").string() + "\n   " + (session / "before.png").string() + "\n   " + (session / "after.png").string() +
-      "\nand drill yourself:  ./osteo rehearse " + prepare.out);
+  say("done; look at\n   " + (out / "case/preview.png").string() + "\n   " + (session / "before.png").string() + "\n   " +
+      (session / "after.png").string() + "\nand drill yourself:  ./osteo rehearse " + prepare.out);
   return code;
 }
 

@@ -16,7 +16,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json triple(Vec3 v) { return {v.x, v.y, v.z}; }
+ordered_json triple(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
 
 void add_frame(ordered_json& j, const Frame& f) {
   j["dims"] = f.dims;
@@ -87,19 +89,25 @@ void print_plain(std::ostream& out, const ordered_json& j, const std::string& in
 
 }  // namespace
 
-cli::CommandInfo ListCommand::info() { return {"list", "the stages with their inputs and outputs", "One line a stage, or with --json their whole declarations.", {}, "osteo list"}; }
+cli::CommandInfo ListCommand::info() {
+  return {
+      "list", "the stages with their inputs and outputs", "One line a stage, or with --json their whole declarations.", {}, "osteo list"};
+}
 
 int ListCommand::run(const Params&, cli::Invocation& io) {
   ordered_json all = ordered_json::array();
   for (const auto& name : io.registry.names()) {
     const auto stage = io.registry.make(name);
     std::string in, out;
-    for (const Port& p : stage->info().inputs) in += (in.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
-    for (const Port& p : stage->info().outputs) out += (out.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
+    for (const Port& p : stage->info().inputs)
+      in += (in.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
+    for (const Port& p : stage->info().outputs)
+      out += (out.empty() ? "" : ", ") + std::string(p.optional ? "[" : "") + p.name + (p.optional ? "]" : "");
     if (io.common.json) {
       all.push_back({{"name", name}, {"version", stage->info().version}, {"synopsis", stage->info().synopsis}});
     } else {
-      io.out << name << std::string(12 - std::min<std::size_t>(11, name.size()), ' ') << (in.empty() ? "-" : in) << " -> " << out << "\n            " << stage->info().synopsis << '\n';
+      io.out << name << std::string(12 - std::min<std::size_t>(11, name.size()), ' ') << (in.empty() ? "-" : in) << " -> " << out
+             << "\n            " << stage->info().synopsis << '\n';
     }
   }
   if (io.common.json) io.out << all.dump(2) << '\n';
@@ -107,7 +115,11 @@ int ListCommand::run(const Params&, cli::Invocation& io) {
 }
 
 cli::CommandInfo InfoCommand::info() {
-  return {"info", "facts on any file that can be read", "Kind, frame, range of values, volume, closedness: whatever applies. A folder is taken for DICOM.", {{"file", "volume, grid, surface, picture, or DICOM folder"}}, "osteo info bone.vdb"};
+  return {"info",
+          "facts on any file that can be read",
+          "Kind, frame, range of values, volume, closedness: whatever applies. A folder is taken for DICOM.",
+          {{"file", "volume, grid, surface, picture, or DICOM folder"}},
+          "osteo info bone.vdb"};
 }
 
 int InfoCommand::run(const Params&, cli::Invocation& io) {
@@ -132,7 +144,11 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
 }
 
 cli::CommandInfo SeriesCommand::info() {
-  return {"series", "the DICOM series of a folder and what each is", "Also as 'osteo import --list'. The one marked * is taken when none is asked for.", {{"folder", "folder with DICOM files at any depth"}}, "osteo series DICOM_FOLDER"};
+  return {"series",
+          "the DICOM series of a folder and what each is",
+          "Also as 'osteo import --list'. The one marked * is taken when none is asked for.",
+          {{"folder", "folder with DICOM files at any depth"}},
+          "osteo series DICOM_FOLDER"};
 }
 
 int SeriesCommand::run(const Params&, cli::Invocation& io) {
@@ -142,8 +158,19 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
   if (io.common.json) {
     ordered_json list = ordered_json::array();
     for (const DicomSeries& s : all) {
-      list.push_back({{"number", s.number}, {"uid", s.uid}, {"modality", s.modality}, {"what", s.what}, {"usable", s.usable}, {"recommended", s.recommended}, {"images", s.images},
-                      {"columns", s.columns}, {"rows", s.rows}, {"pixel_mm", s.pixel_mm}, {"thickness_mm", s.thickness_mm}, {"kernel", s.kernel}, {"description", s.description}});
+      list.push_back({{"number", s.number},
+                      {"uid", s.uid},
+                      {"modality", s.modality},
+                      {"what", s.what},
+                      {"usable", s.usable},
+                      {"recommended", s.recommended},
+                      {"images", s.images},
+                      {"columns", s.columns},
+                      {"rows", s.rows},
+                      {"pixel_mm", s.pixel_mm},
+                      {"thickness_mm", s.thickness_mm},
+                      {"kernel", s.kernel},
+                      {"description", s.description}});
     }
     io.out << list.dump(2) << '\n';
     return 0;
@@ -152,8 +179,8 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
   for (const DicomSeries& s : all) {
     char line[256];
     const std::string size = std::to_string(s.columns) + "x" + std::to_string(s.rows);
-    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-18s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images, size.c_str(), s.pixel_mm,
-                  s.thickness_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
+    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-18s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images,
+                  size.c_str(), s.pixel_mm, s.thickness_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
     io.out << line;
   }
   return 0;

@@ -12,23 +12,33 @@
 namespace osteo {
 
 cli::CommandInfo PrepareCommand::info() {
-  return {"prepare", "a CT becomes a case that can be rehearsed",
-          "Runs the pipeline temporal-bone.json: import, threshold, resample, surface, preview; writes a manifest. Run again, it keeps what is unchanged. "
+  return {"prepare",
+          "a CT becomes a case that can be rehearsed",
+          "Runs the pipeline temporal-bone.json: import, threshold, resample, surface, preview; writes a manifest. Run again, it keeps "
+          "what is unchanged. "
           "Variables of the pipeline are also set with --set NAME=VALUE.",
-          {{"source", "DICOM folder, or a volume file (.nrrd .nii.gz .mha .vti)"}}, "osteo prepare DICOM_FOLDER -o CASE"};
+          {{"source", "DICOM folder, or a volume file (.nrrd .nii.gz .mha .vti)"}},
+          "osteo prepare DICOM_FOLDER -o CASE"};
 }
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo prepare " + io.arguments[0] + " -o CASE");
   require_readable(io.arguments[0]);
   const fs::path folder = p.out;
-  if (fs::exists(folder) && !fs::is_directory(folder)) throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is a file, not a folder");
+  if (fs::exists(folder) && !fs::is_directory(folder))
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is a file, not a folder");
   const bool is_new = !fs::exists(folder);
-  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") && !io.common.force) {
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case", "give another name, or --force to write into it");
+  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") &&
+      !io.common.force) {
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case",
+                "give another name, or --force to write into it");
   }
-  std::map<std::string, std::string> settings{{"source", io.arguments[0]}, {"case", folder.string()}, {"lower", format_number(p.lower)},
-                                              {"spacing_mm", format_number(p.spacing_mm)}, {"series", p.series}, {"axes", p.axes}};
+  std::map<std::string, std::string> settings{{"source", io.arguments[0]},
+                                              {"case", folder.string()},
+                                              {"lower", format_number(p.lower)},
+                                              {"spacing_mm", format_number(p.spacing_mm)},
+                                              {"series", p.series},
+                                              {"axes", p.axes}};
   for (const auto& [key, value] : io.settings) settings[key] = value;
   const std::string text = p.pipeline.empty() ? std::string(kTemporalBonePipeline) : read_text(p.pipeline);
   Pipeline pipeline = parse_pipeline(text, settings);
@@ -37,9 +47,12 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
 
   std::error_code ec;
   fs::create_directories(folder, ec);
-  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message(), "choose a folder that you may write to");
+  if (ec)
+    throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message(),
+                "choose a folder that you may write to");
   try {
-    const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = !io.common.force}, io.context);
+    const auto results =
+        run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = !io.common.force}, io.context);
     write_manifest(folder, name, results);
     io.end_progress();
     cli::print_results(results, io);
@@ -49,8 +62,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     throw;
   }
   if (!io.common.quiet) {
-    io.err << "case: " << folder.string() << "  (peak memory " << std::lround(peak_memory_mb()) << " MB)\n  look at " << (folder / "preview.png").string() << "\n  then: osteo rehearse "
-           << folder.string() << '\n';
+    io.err << "case: " << folder.string() << "  (peak memory " << std::lround(peak_memory_mb()) << " MB)\n  look at "
+           << (folder / "preview.png").string() << "\n  then: osteo rehearse " << folder.string() << '\n';
   }
   return 0;
 }

@@ -27,9 +27,13 @@ using nlohmann::ordered_json;
 // The window is a program of its own, so that servers need neither GLFW nor a display.
 int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
   const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-rehearse";
-  if (!fs::exists(program)) throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)", "build with -DOSTEO_WINDOW=ON, or use --headless");
-  std::vector<std::string> args{program.string(), io.arguments[0], "--burr", std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]), "--diameter-mm",
-                                format_number(p.diameter_mm), "--rate-hz", format_number(p.rate_hz)};
+  if (!fs::exists(program))
+    throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
+                "build with -DOSTEO_WINDOW=ON, or use --headless");
+  std::vector<std::string> args{program.string(), io.arguments[0],
+                                "--burr",         std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]),
+                                "--diameter-mm",  format_number(p.diameter_mm),
+                                "--rate-hz",      format_number(p.rate_hz)};
   if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
   if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
   std::vector<char*> argv;
@@ -42,10 +46,13 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 }  // namespace
 
 cli::CommandInfo RehearseCommand::info() {
-  return {"rehearse", "drill the bone of a case, in a window or by script",
-          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same servo, and the session, "
+  return {"rehearse",
+          "drill the bone of a case, in a window or by script",
+          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
+          "servo, and the session, "
           "pictures from before and after, and a summary are written.",
-          {{"case", "a folder made by prepare"}}, "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
+          {{"case", "a folder made by prepare"}},
+          "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
 
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
@@ -100,21 +107,26 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
-      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999)) << " us; wake-up late p99 "
-             << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work " << l.missed_by_work << ", by the machine " << l.missed_by_machine << "; real-time priority "
+      io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999))
+             << " us; wake-up late p99 " << std::lround(l.lateness.quantile_us(0.99)) << " us; periods missed by our work "
+             << l.missed_by_work << ", by the machine " << l.missed_by_machine << "; real-time priority "
              << (l.realtime_granted ? "granted" : "refused (" + l.realtime_refusal + ")") << '\n';
     }
-    io.err << "session: " << folder.string() << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay " << folder.string() << '\n';
+    io.err << "session: " << folder.string() << "  (before.png, after.png, surface.ply, summary.json)\n  again: osteo replay "
+           << folder.string() << '\n';
   }
   if (io.common.json) io.out << summary;
   return 0;
 }
 
 cli::CommandInfo ReplayCommand::info() {
-  return {"replay", "run a session again and prove that it comes out the same",
-          "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; also applies the recorded "
+  return {"replay",
+          "run a session again and prove that it comes out the same",
+          "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; "
+          "also applies the recorded "
           "voxel changes and compares that. Exit code 7 when anything differs.",
-          {{"session", "a session folder"}}, "osteo replay SESSION"};
+          {{"session", "a session folder"}},
+          "osteo replay SESSION"};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
@@ -123,20 +135,25 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   BrickGrid bone = bone_at_begin(folder);
   const ReplayResult r = replay(session, bone, io.context);
   if (!p.surface_out.empty()) {
-    if (fs::exists(p.surface_out) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");
+    if (fs::exists(p.surface_out) && !io.common.force)
+      throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");
     save_surface(surface_nets(bone, 0.5F, io.context).mesh, p.surface_out);
   }
   if (!p.bone_out.empty()) {
-    if (fs::exists(p.bone_out) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + p.bone_out + "' exists already", "--force replaces it");
+    if (fs::exists(p.bone_out) && !io.common.force)
+      throw Error(ExitCode::cannot_write, "'" + p.bone_out + "' exists already", "--force replaces it");
     save_grid(to_sparse(bone, "density"), p.bone_out);
   }
   io.end_progress();
-  ordered_json j{{"ticks", r.ticks}, {"identical", r.identical}, {"complete", r.complete}, {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash}, {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  ordered_json j{{"ticks", r.ticks},         {"identical", r.identical},       {"complete", r.complete},
+                 {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash}, {"removed_mm3", r.removed_mm3},
+                 {"seconds", r.seconds}};
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
   if (!io.common.quiet) {
-    io.err << "replayed " << r.ticks << " ticks in " << format_number(std::round(r.seconds * 100) / 100) << " s: "
-           << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference) << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
+    io.err << "replayed " << r.ticks << " ticks in " << format_number(std::round(r.seconds * 100) / 100)
+           << " s: " << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference)
+           << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
   }
   return r.identical ? 0 : static_cast<int>(ExitCode::failed);

@@ -11,8 +11,12 @@
 namespace osteo {
 
 cli::CommandInfo RunCommand::info() {
-  return {"run", "run a pipeline file", "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set ID.PARAMETER=VALUE. The whole graph is checked before anything is read.",
-          {{"pipeline", "a .json file"}}, "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE"};
+  return {"run",
+          "run a pipeline file",
+          "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set ID.PARAMETER=VALUE. The whole graph is "
+          "checked before anything is read.",
+          {{"pipeline", "a .json file"}},
+          "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE"};
 }
 
 int RunCommand::run(const Params& p, cli::Invocation& io) {
@@ -40,9 +44,11 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
     validate(pipeline, io.registry);
     for (const auto& n : pipeline.nodes) {
       io.out << n.id << " (" << n.stage << ")\n";
-      for (const auto& [port, in] : n.inputs) io.out << "  " << port << " <- " << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
+      for (const auto& [port, in] : n.inputs)
+        io.out << "  " << port << " <- " << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
       for (const auto& [name, value] : n.params) io.out << "  " << name << " = " << value << '\n';
-      for (const auto& [port, path] : n.outputs) io.out << "  " << port << " -> " << path.string() << (fs::exists(path) ? " (exists)" : "") << '\n';
+      for (const auto& [port, path] : n.outputs)
+        io.out << "  " << port << " -> " << path.string() << (fs::exists(path) ? " (exists)" : "") << '\n';
     }
     return 0;
   }
@@ -53,7 +59,11 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
 }
 
 cli::CommandInfo DocsCommand::info() {
-  return {"docs", "write the reference pages, the schema and the completion", "All of them are made from the declarations of the stages and commands.", {{"folder", "usually docs/reference"}}, "osteo docs docs/reference"};
+  return {"docs",
+          "write the reference pages, the schema and the completion",
+          "All of them are made from the declarations of the stages and commands.",
+          {{"folder", "usually docs/reference"}},
+          "osteo docs docs/reference"};
 }
 
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
@@ -75,7 +85,8 @@ int DocsCommand::run(const Params& p, cli::Invocation& io) {
     io.err << "stale: " << entry.path().string() << " belongs to nothing\n";
     ++stale;
   }
-  if (p.check && stale > 0) throw Error(ExitCode::failed, std::to_string(stale) + " reference pages are stale", "run: osteo docs " + folder.string());
+  if (p.check && stale > 0)
+    throw Error(ExitCode::failed, std::to_string(stale) + " reference pages are stale", "run: osteo docs " + folder.string());
   return 0;
 }
 

@@ -14,9 +14,15 @@ struct Context::Shared {
 
 Context::Context() : shared_(std::make_shared<Shared>()) {}
 
-void Context::on_progress(ProgressSink sink) { shared_->progress = std::move(sink); }
-void Context::on_log(LogSink sink) { shared_->log = std::move(sink); }
-void Context::set_cancel_flag(const std::atomic<bool>* flag) { shared_->cancel = flag; }
+void Context::on_progress(ProgressSink sink) {
+  shared_->progress = std::move(sink);
+}
+void Context::on_log(LogSink sink) {
+  shared_->log = std::move(sink);
+}
+void Context::set_cancel_flag(const std::atomic<bool>* flag) {
+  shared_->cancel = flag;
+}
 
 bool Context::cancelled() const noexcept {
   return shared_->cancel != nullptr && shared_->cancel->load(std::memory_order_relaxed);

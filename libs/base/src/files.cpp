@@ -66,6 +66,14 @@ void sync_path(const fs::path& path, const fs::path& shown) {
   if (rc != 0 && error != EINVAL && error != ENOTSUP) throw_write_error(shown, error);
 }
 
+// Some libraries do not notice that a disk filled up under them. A file that ends exactly with the disk's last block is taken
+// for cut: better a good file refused than a cut one accepted.
+void require_space_left(const fs::path& path) {
+  std::error_code ec;
+  const auto space = fs::space(path.has_parent_path() ? path.parent_path() : fs::path("."), ec);
+  if (!ec && space.free == 0) throw_write_error(path, ENOSPC);
+}
+
 void prepare_parent(const fs::path& path) {
   const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
   std::error_code ec;
@@ -88,11 +96,10 @@ void require_readable(const fs::path& path) {
   const int mode = fs::is_directory(status) ? R_OK | X_OK : R_OK;
   // Root passes access() on files without any read bit. A file nobody may read is refused for root as well: the hospital
   // server that runs as root should behave like the workstation where the case was tried.
-  const bool no_read_bit = (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) ==
-                           fs::perms::none;
+  const bool no_read_bit =
+      (status.permissions() & (fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read)) == fs::perms::none;
   if (::access(path.c_str(), mode) != 0 || no_read_bit) {
-    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied",
-                "ask the owner for read permission");
+    throw Error(ExitCode::cannot_read, "cannot read '" + path.string() + "': permission denied", "ask the owner for read permission");
   }
 }
 
@@ -118,6 +125,7 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   const Temporary temporary(path);
   write(temporary.path());
   sync_path(temporary.path(), path);
+  require_space_left(path);
   if (::rename(temporary.path().c_str(), path.c_str()) != 0) throw_write_error(path, errno);
 }
 
@@ -152,6 +160,7 @@ void write_folder_atomically(const fs::path& path, bool replace, const std::func
   if (ec) throw_write_error(target, ec.value());
   fill(temporary.path());
   sync_path(temporary.path(), target);
+  require_space_left(target);
   if (fs::exists(target)) {
     const Temporary old(target);
     fs::rename(target, old.path(), ec);
@@ -176,8 +185,12 @@ void remove_temporaries() noexcept {
   }
 }
 
-Hasher::Hasher() : state_(XXH3_createState()) { XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_)); }
-Hasher::~Hasher() { XXH3_freeState(static_cast<XXH3_state_t*>(state_)); }
+Hasher::Hasher() : state_(XXH3_createState()) {
+  XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_));
+}
+Hasher::~Hasher() {
+  XXH3_freeState(static_cast<XXH3_state_t*>(state_));
+}
 void Hasher::add(const void* data, std::size_t bytes) {
   XXH3_128bits_update(static_cast<XXH3_state_t*>(state_), data, bytes);
 }
@@ -201,7 +214,9 @@ std::string hash_bytes(std::span<const std::byte> bytes) {
   return h.hex();
 }
 
-std::string hash_text(std::string_view text) { return hash_bytes(std::as_bytes(std::span(text.data(), text.size()))); }
+std::string hash_text(std::string_view text) {
+  return hash_bytes(std::as_bytes(std::span(text.data(), text.size())));
+}
 
 std::string hash_path(const fs::path& path) {
   require_readable(path);

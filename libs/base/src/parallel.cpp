@@ -18,9 +18,12 @@ void parallel_for(std::size_t n, std::size_t grain, int threads, const std::func
   }
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks, 1), [&](const auto& range) {
-      for (std::size_t c = range.begin(); c != range.end(); ++c) run(c);
-    }, tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, chunks, 1),
+        [&](const auto& range) {
+          for (std::size_t c = range.begin(); c != range.end(); ++c) run(c);
+        },
+        tbb::simple_partitioner());
   });
 }
 

@@ -61,76 +61,73 @@ std::string FieldRef::flag() const {
 }
 
 std::string_view FieldRef::kind() const {
-  return std::visit(Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
-                             [](double*) { return std::string_view("number"); },
-                             [](std::string*) { return std::string_view("text"); },
-                             [](std::array<double, 3>*) { return std::string_view("triple"); },
-                             [](Choice) { return std::string_view("choice"); }},
-                    target);
+  return std::visit(
+      Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
+               [](double*) { return std::string_view("number"); }, [](std::string*) { return std::string_view("text"); },
+               [](std::array<double, 3>*) { return std::string_view("triple"); }, [](Choice) { return std::string_view("choice"); }},
+      target);
 }
 
 std::string FieldRef::to_text() const {
-  return std::visit(
-      Overload{[](bool* p) { return std::string(*p ? "true" : "false"); }, [](int* p) { return std::to_string(*p); },
-               [](double* p) { return format_number(*p); }, [](std::string* p) { return *p; },
-               [](std::array<double, 3>* p) {
-                 return format_number((*p)[0]) + "," + format_number((*p)[1]) + "," + format_number((*p)[2]);
-               },
-               [](Choice c) { return std::string(c.names[static_cast<std::size_t>(*c.index)]); }},
-      target);
+  return std::visit(Overload{[](bool* p) { return std::string(*p ? "true" : "false"); }, [](int* p) { return std::to_string(*p); },
+                             [](double* p) { return format_number(*p); }, [](std::string* p) { return *p; },
+                             [](std::array<double, 3>* p) {
+                               return format_number((*p)[0]) + "," + format_number((*p)[1]) + "," + format_number((*p)[2]);
+                             },
+                             [](Choice c) { return std::string(c.names[static_cast<std::size_t>(*c.index)]); }},
+                    target);
 }
 
 void FieldRef::from_text(std::string_view text) const {
-  std::visit(
-      Overload{[&](bool* p) {
-                 if (text == "true" || text == "1" || text == "yes" || text.empty()) {
-                   *p = true;
-                 } else if (text == "false" || text == "0" || text == "no") {
-                   *p = false;
-                 } else {
-                   throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is neither true nor false");
-                 }
-               },
-               [&](int* p) {
-                 const double value = parse_number(text, flag());
-                 if (value != std::floor(value) || std::abs(value) > 2e9) {
-                   throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not a whole number");
-                 }
-                 check_range(*this, value);
-                 *p = static_cast<int>(value);
-               },
-               [&](double* p) {
-                 const double value = parse_number(text, flag());
-                 check_range(*this, value);
-                 *p = value;
-               },
-               [&](std::string* p) { *p = text; },
-               [&](std::array<double, 3>* p) {
-                 std::array<double, 3> value{};
-                 std::string_view rest = text;
-                 for (std::size_t i = 0; i < 3; ++i) {
-                   const std::size_t comma = rest.find(',');
-                   if ((comma == std::string_view::npos) != (i == 2)) {
-                     throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
-                   }
-                   value[i] = parse_number(rest.substr(0, comma), flag());
-                   check_range(*this, value[i]);
-                   rest = i == 2 ? std::string_view() : rest.substr(comma + 1);
-                 }
-                 *p = value;
-               },
-               [&](Choice c) {
-                 for (std::size_t i = 0; i < c.names.size(); ++i) {
-                   if (c.names[i] == text) {
-                     *c.index = static_cast<int>(i);
-                     return;
-                   }
-                 }
-                 std::string list;
-                 for (const auto name : c.names) list.append(list.empty() ? "" : ", ").append(name);
-                 throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not one of " + list);
-               }},
-      target);
+  std::visit(Overload{[&](bool* p) {
+                        if (text == "true" || text == "1" || text == "yes" || text.empty()) {
+                          *p = true;
+                        } else if (text == "false" || text == "0" || text == "no") {
+                          *p = false;
+                        } else {
+                          throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is neither true nor false");
+                        }
+                      },
+                      [&](int* p) {
+                        const double value = parse_number(text, flag());
+                        if (value != std::floor(value) || std::abs(value) > 2e9) {
+                          throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not a whole number");
+                        }
+                        check_range(*this, value);
+                        *p = static_cast<int>(value);
+                      },
+                      [&](double* p) {
+                        const double value = parse_number(text, flag());
+                        check_range(*this, value);
+                        *p = value;
+                      },
+                      [&](std::string* p) { *p = text; },
+                      [&](std::array<double, 3>* p) {
+                        std::array<double, 3> value{};
+                        std::string_view rest = text;
+                        for (std::size_t i = 0; i < 3; ++i) {
+                          const std::size_t comma = rest.find(',');
+                          if ((comma == std::string_view::npos) != (i == 2)) {
+                            throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
+                          }
+                          value[i] = parse_number(rest.substr(0, comma), flag());
+                          check_range(*this, value[i]);
+                          rest = i == 2 ? std::string_view() : rest.substr(comma + 1);
+                        }
+                        *p = value;
+                      },
+                      [&](Choice c) {
+                        for (std::size_t i = 0; i < c.names.size(); ++i) {
+                          if (c.names[i] == text) {
+                            *c.index = static_cast<int>(i);
+                            return;
+                          }
+                        }
+                        std::string list;
+                        for (const auto name : c.names) list.append(list.empty() ? "" : ", ").append(name);
+                        throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not one of " + list);
+                      }},
+             target);
 }
 
 std::string nearest_name(std::string_view word, std::span<const std::string> known) {

@@ -9,7 +9,9 @@
 
 namespace osteo {
 
-std::string Burr::name() const { return std::string(kind == BurrKind::cutting ? "cutting " : "diamond ") + format_number(diameter_mm) + " mm"; }
+std::string Burr::name() const {
+  return std::string(kind == BurrKind::cutting ? "cutting " : "diamond ") + format_number(diameter_mm) + " mm";
+}
 
 const std::vector<Burr>& burr_library() {
   static const std::vector<Burr> library = [] {
@@ -28,7 +30,8 @@ int burr_index(const std::string& kind, double diameter_mm) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     if ((all[i].kind == BurrKind::cutting) == (kind == "cutting") && all[i].diameter_mm == diameter_mm) return static_cast<int>(i);
   }
-  throw Error(ExitCode::usage, "there is no " + kind + " burr of " + format_number(diameter_mm) + " mm", "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
+  throw Error(ExitCode::usage, "there is no " + kind + " burr of " + format_number(diameter_mm) + " mm",
+              "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
 }
 
 BurrSamples sample_burr(const Burr& burr) {
@@ -46,7 +49,8 @@ BurrSamples sample_burr(const Burr& burr) {
         if (d > r) continue;
         s.offset_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
         const double latitude = std::abs(std::numbers::pi / 2 - std::acos(std::clamp(p.z / d, -1.0, 1.0)));
-        s.efficiency.push_back(static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n)));
+        s.efficiency.push_back(
+            static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n)));
       }
     }
   }

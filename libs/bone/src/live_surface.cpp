@@ -7,7 +7,8 @@
 
 namespace osteo {
 
-LiveSurface::LiveSurface(const BrickGrid& bone, const Context& context) : bone_(bone), patches_(bone.brick_count()), is_dirty_(bone.brick_count()) {
+LiveSurface::LiveSurface(const BrickGrid& bone, const Context& context)
+    : bone_(bone), patches_(bone.brick_count()), is_dirty_(bone.brick_count()) {
   dirty_.reserve(bone.brick_count());
   parallel_for(patches_.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();

@@ -104,8 +104,8 @@ std::string markdown_fields(const std::vector<FieldRef>& fields) {
   for (const FieldRef& f : fields) {
     std::string range = choices_text(f);
     if (range.empty()) range = range_text(f);
-    text += "| `" + f.flag() + "` | `" + std::string(f.doc.name) + "` | " + (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " + range + " | " +
-            std::string(f.doc.help) + " |\n";
+    text += "| `" + f.flag() + "` | `" + std::string(f.doc.name) + "` | " + (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " +
+            range + " | " + std::string(f.doc.help) + " |\n";
   }
   return text;
 }
@@ -113,10 +113,14 @@ std::string markdown_fields(const std::vector<FieldRef>& fields) {
 std::string escape_xml(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if (c == '&') out += "&amp;";
-    else if (c == '<') out += "&lt;";
-    else if (c == '>') out += "&gt;";
-    else out += c;
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else
+      out += c;
   }
   return out;
 }
@@ -180,7 +184,9 @@ std::string flag_text(const FieldRef& field) {
   return field.flag() + " <" + what + ">";
 }
 
-std::string output_flag(const Port& port) { return "--" + port.name + "-out"; }
+std::string output_flag(const Port& port) {
+  return "--" + port.name + "-out";
+}
 
 std::string program_help(const Program& program) {
   std::ostringstream out;
@@ -189,7 +195,8 @@ std::string program_help(const Program& program) {
   out << "\nCommands:\n";
   for (const auto& c : program.commands) row(out, c->info().name, c->info().synopsis);
   row(out, "help", "this text, or the help of a stage or command");
-  out << "\n'osteo help NAME' tells all of a stage or command. First steps:\n  osteo prepare DICOM_FOLDER -o CASE    then    osteo rehearse CASE\n";
+  out << "\n'osteo help NAME' tells all of a stage or command. First steps:\n  osteo prepare DICOM_FOLDER -o CASE    then    osteo "
+         "rehearse CASE\n";
   return out.str();
 }
 
@@ -247,15 +254,20 @@ std::string command_help(Command& command) {
 std::string stage_xml(Stage& stage) {
   const StageInfo& info = stage.info();
   std::ostringstream out;
-  out << "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<executable>\n  <category>Osteotome</category>\n  <title>" << escape_xml(title_case(info.name))
-      << "</title>\n  <description>" << escape_xml(info.description) << "</description>\n  <version>" << info.version << "</version>\n";
+  out << "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<executable>\n  <category>Osteotome</category>\n  <title>"
+      << escape_xml(title_case(info.name)) << "</title>\n  <description>" << escape_xml(info.description) << "</description>\n  <version>"
+      << info.version << "</version>\n";
   const auto tag_of = [](DataKind kind) {
     switch (kind) {
       case DataKind::image:
-      case DataKind::labels: return "image";
-      case DataKind::surface: return "geometry";
-      case DataKind::source: return "directory";
-      default: return "file";
+      case DataKind::labels:
+        return "image";
+      case DataKind::surface:
+        return "geometry";
+      case DataKind::source:
+        return "directory";
+      default:
+        return "file";
     }
   };
   out << "  <parameters>\n    <label>Input and output</label>\n";
@@ -264,10 +276,12 @@ std::string stage_xml(Stage& stage) {
     const std::string tag = tag_of(p.kinds.front());
     out << "    <" << tag;
     if (p.kinds.front() == DataKind::labels) out << " type=\"label\"";
-    out << ">\n      <name>" << p.name << (std::string(channel) == "output" ? "_out" : "") << "</name>\n      <label>" << escape_xml(title_case(p.name)) << "</label>\n      <channel>" << channel
-        << "</channel>\n";
-    if (p.optional) out << "      <longflag>" << flag << "</longflag>\n";
-    else out << "      <index>" << index++ << "</index>\n";
+    out << ">\n      <name>" << p.name << (std::string(channel) == "output" ? "_out" : "") << "</name>\n      <label>"
+        << escape_xml(title_case(p.name)) << "</label>\n      <channel>" << channel << "</channel>\n";
+    if (p.optional)
+      out << "      <longflag>" << flag << "</longflag>\n";
+    else
+      out << "      <index>" << index++ << "</index>\n";
     out << "      <description>" << escape_xml(p.help) << "</description>\n    </" << tag << ">\n";
   };
   for (const Port& p : info.inputs) port(p, "input", "--" + p.name);
@@ -277,15 +291,21 @@ std::string stage_xml(Stage& stage) {
   if (!fields.empty()) out << "  <parameters>\n    <label>Parameters</label>\n";
   for (const FieldRef& f : fields) {
     const std::string_view kind = f.kind();
-    const std::string tag = kind == "flag" ? "boolean" : kind == "int" ? "integer" : kind == "number" ? "double" : kind == "choice" ? "string-enumeration" : kind == "triple" ? "double-vector" : "string";
+    const std::string tag = kind == "flag"     ? "boolean"
+                            : kind == "int"    ? "integer"
+                            : kind == "number" ? "double"
+                            : kind == "choice" ? "string-enumeration"
+                            : kind == "triple" ? "double-vector"
+                                               : "string";
     out << "    <" << tag << ">\n      <name>" << f.doc.name << "</name>\n      <label>" << escape_xml(title_case(std::string(f.doc.name)))
-        << "</label>\n      <longflag>" << f.flag() << "</longflag>\n      <description>" << escape_xml(f.doc.help) << "</description>\n      <default>"
-        << escape_xml(f.to_text()) << "</default>\n";
+        << "</label>\n      <longflag>" << f.flag() << "</longflag>\n      <description>" << escape_xml(f.doc.help)
+        << "</description>\n      <default>" << escape_xml(f.to_text()) << "</default>\n";
     if (const auto* c = std::get_if<FieldRef::Choice>(&f.target)) {
       for (const auto name : c->names) out << "      <element>" << name << "</element>\n";
     }
     if ((kind == "int" || kind == "number") && std::isfinite(f.doc.lo) && std::isfinite(f.doc.hi)) {
-      out << "      <constraints><minimum>" << format_number(f.doc.lo) << "</minimum><maximum>" << format_number(f.doc.hi) << "</maximum></constraints>\n";
+      out << "      <constraints><minimum>" << format_number(f.doc.lo) << "</minimum><maximum>" << format_number(f.doc.hi)
+          << "</maximum></constraints>\n";
     }
     out << "    </" << tag << ">\n";
   }
@@ -329,7 +349,9 @@ std::string pipeline_schema(const Program& program) {
   p["description"] = {{"type", "string"}};
   p["variables"] = {{"type", "object"},
                     {"additionalProperties",
-                     {{"type", "object"}, {"additionalProperties", false}, {"properties", {{"help", {{"type", "string"}}}, {"default", ordered_json::object()}}}}}};
+                     {{"type", "object"},
+                      {"additionalProperties", false},
+                      {"properties", {{"help", {{"type", "string"}}}, {"default", ordered_json::object()}}}}}};
   auto any = ordered_json::array();
   for (const auto& name : program.registry.names()) {
     const auto stage = program.registry.make(name);
@@ -343,8 +365,10 @@ std::string pipeline_schema(const Program& program) {
     sp["stage"] = {{"const", name}};
     ordered_json in{{"type", "object"}, {"additionalProperties", false}, {"properties", ordered_json::object()}};
     for (const Port& port : stage->info().inputs) {
-      in["properties"][port.name] = {{"description", port.help + " (" + kinds_text(port.kinds) + ")"},
-                                     {"anyOf", {{{"type", "string"}}, {{"type", "object"}, {"required", {"file"}}, {"properties", {{"file", {{"type", "string"}}}}}}}}};
+      in["properties"][port.name] = {
+          {"description", port.help + " (" + kinds_text(port.kinds) + ")"},
+          {"anyOf",
+           {{{"type", "string"}}, {{"type", "object"}, {"required", {"file"}}, {"properties", {{"file", {{"type", "string"}}}}}}}}};
       if (!port.optional) in["required"].push_back(port.name);
     }
     sp["in"] = in;
@@ -362,7 +386,8 @@ std::string pipeline_schema(const Program& program) {
 
 std::string bash_completion(const Program& program) {
   std::ostringstream out;
-  out << "# bash completion of osteo: source it, or put it into /etc/bash_completion.d\n_osteo() {\n  local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}\n"
+  out << "# bash completion of osteo: source it, or put it into /etc/bash_completion.d\n_osteo() {\n  local cur=${COMP_WORDS[COMP_CWORD]} "
+         "prev=${COMP_WORDS[COMP_CWORD-1]}\n"
       << "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n    COMPREPLY=($(compgen -W \"";
   for (const auto& name : program.registry.names()) out << name << ' ';
   for (const auto& c : program.commands) out << c->info().name << ' ';
@@ -398,7 +423,8 @@ std::string bash_completion(const Program& program) {
     for (const FieldRef& f : c->fields()) out << ' ' << f.flag();
     out << "\" ;;\n";
   }
-  out << "  esac\n  case \"$cur\" in\n    -*) COMPREPLY=($(compgen -W \"$flags\" -- \"$cur\")) ;;\n    *) COMPREPLY=($(compgen -f -- \"$cur\")) ;;\n  esac\n}\ncomplete -o filenames -F _osteo osteo ./osteo\n";
+  out << "  esac\n  case \"$cur\" in\n    -*) COMPREPLY=($(compgen -W \"$flags\" -- \"$cur\")) ;;\n    *) COMPREPLY=($(compgen -f -- "
+         "\"$cur\")) ;;\n  esac\n}\ncomplete -o filenames -F _osteo osteo ./osteo\n";
   return out.str();
 }
 
@@ -410,11 +436,14 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
     const auto stage = program.registry.make(name);
     const StageInfo& info = stage->info();
     index += "| [" + name + "](stage-" + name + ".md) | " + info.synopsis + " |\n";
-    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description + "\n\n## Inputs\n\n";
+    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description +
+                       "\n\n## Inputs\n\n";
     if (info.inputs.empty()) page += "None.\n";
-    for (const Port& p : info.inputs) page += "- `" + p.name + "`: " + port_text(p, false) + (p.optional ? "; optional, `--" + p.name + " FILE`" : "") + "\n";
+    for (const Port& p : info.inputs)
+      page += "- `" + p.name + "`: " + port_text(p, false) + (p.optional ? "; optional, `--" + p.name + " FILE`" : "") + "\n";
     page += "\n## Outputs\n\n";
-    for (const Port& p : info.outputs) page += "- `" + p.name + "`: " + port_text(p, true) + (p.optional ? "; optional, `" + output_flag(p) + " FILE`" : "") + "\n";
+    for (const Port& p : info.outputs)
+      page += "- `" + p.name + "`: " + port_text(p, true) + (p.optional ? "; optional, `" + output_flag(p) + " FILE`" : "") + "\n";
     page += "\n## Parameters\n\n" + markdown_fields(stage->fields());
     if (!info.references.empty()) {
       page += "\n## References\n\n";
@@ -427,7 +456,8 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   for (const auto& c : program.commands) {
     const CommandInfo& info = c->info();
     index += "| [" + info.name + "](command-" + info.name + ".md) | " + info.synopsis + " |\n";
-    std::string page = note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description + "\n\n";
+    std::string page =
+        note + "# " + info.name + "\n\n" + info.synopsis + "\n\n```\n" + usage_line(info) + "\n```\n\n" + info.description + "\n\n";
     if (!info.positionals.empty()) {
       page += "## Arguments\n\n";
       for (const auto& p : info.positionals) page += "- `" + p.name + "`: " + p.help + (p.optional ? " (optional)" : "") + "\n";
@@ -441,7 +471,8 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   index += "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [bash completion](osteo.bash).\n";
   pages["README.md"] = index;
   std::string codes = note + "# Exit codes\n\n| code | name | meaning |\n|---|---|---|\n";
-  for (const auto& d : exit_code_table) codes += "| " + std::to_string(static_cast<int>(d.code)) + " | " + std::string(d.name) + " | " + std::string(d.meaning) + " |\n";
+  for (const auto& d : exit_code_table)
+    codes += "| " + std::to_string(static_cast<int>(d.code)) + " | " + std::string(d.name) + " | " + std::string(d.meaning) + " |\n";
   pages["exit-codes.md"] = codes;
   pages["pipeline.schema.json"] = pipeline_schema(program);
   pages["osteo.bash"] = bash_completion(program);

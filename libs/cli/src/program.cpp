@@ -1,9 +1,9 @@
+#include <unistd.h>
 #include <csignal>
 #include <cstring>
 #include <iostream>
 #include <new>
 #include <set>
-#include <unistd.h>
 
 #include "describe.h"
 #include "osteo/base/error.h"
@@ -29,7 +29,8 @@ struct Parsed {
   std::vector<std::pair<std::string, std::string>> settings;
 };
 
-Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags, bool takes_settings) {
+Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags,
+             bool takes_settings) {
   Parsed parsed;
   std::vector<std::string> known{"--help"};
   for (const auto& f : fields) known.push_back(f.flag());
@@ -43,7 +44,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       continue;
     }
     const bool short_out = arg == "-o";
-    if (only_positionals || !arg.starts_with('-') || arg == "-" || (arg.size() > 1 && (std::isdigit(static_cast<unsigned char>(arg[1])) != 0))) {
+    if (only_positionals || !arg.starts_with('-') || arg == "-" ||
+        (arg.size() > 1 && (std::isdigit(static_cast<unsigned char>(arg[1])) != 0))) {
       parsed.positionals.push_back(arg);
       continue;
     }
@@ -78,7 +80,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
     }
     // --no-fill for a flag that is on by default.
     if (name.starts_with("--no-")) {
-      const auto off = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.kind() == "flag" && f.flag() == "--" + name.substr(5); });
+      const auto off = std::find_if(fields.begin(), fields.end(),
+                                    [&](const FieldRef& f) { return f.kind() == "flag" && f.flag() == "--" + name.substr(5); });
       if (off != fields.end()) {
         off->from_text("false");
         continue;
@@ -118,7 +121,9 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
   if (parsed.positionals.size() != required) {
     std::string wanted;
     for (const auto& n : names) wanted += " " + n;
-    throw Error(ExitCode::usage, "osteo " + info.name + " takes" + wanted + "; " + std::to_string(parsed.positionals.size()) + " of " + std::to_string(required) + " were given",
+    throw Error(ExitCode::usage,
+                "osteo " + info.name + " takes" + wanted + "; " + std::to_string(parsed.positionals.size()) + " of " +
+                    std::to_string(required) + " were given",
                 "'osteo help " + info.name + "' tells more");
   }
   ready();
@@ -164,14 +169,16 @@ Command* Program::find(std::string_view name) const {
 namespace {
 
 // Throws what went wrong; `printer` is the caller's, so that it can clear the bar before it prints an error.
-int dispatch(Program& program, std::vector<std::string> args, std::ostream& out, std::ostream& err, std::unique_ptr<ProgressPrinter>& printer) {
+int dispatch(Program& program, std::vector<std::string> args, std::ostream& out, std::ostream& err,
+             std::unique_ptr<ProgressPrinter>& printer) {
   if (args.empty()) {
     err << program_help(program);
     return static_cast<int>(ExitCode::usage);
   }
   const std::string name = args.front();
   args.erase(args.begin());
-  const bool wants_help = std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
+  const bool wants_help =
+      std::find(args.begin(), args.end(), "--help") != args.end() || std::find(args.begin(), args.end(), "-h") != args.end();
   if (name == "--help" || name == "-h" || (name == "help" && args.empty())) {
     out << program_help(program);
     return 0;
@@ -187,7 +194,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     for (const auto& c : program.commands) known.push_back(c->info().name);
     known.emplace_back("help");
     const std::string near = nearest_name(subject, known);
-    throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'", near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
+    throw Error(ExitCode::usage, "there is no stage or command '" + subject + "'",
+                near.empty() ? "'osteo help' shows them all" : "did you mean '" + near + "'?");
   }
   if (name == "help" || wants_help) {
     out << (command != nullptr ? command_help(*command) : stage_help(*program.registry.make(subject)));
@@ -215,7 +223,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   };
   int code = 0;
   // 'osteo import --list FOLDER' asks what is there; that is the verb 'series'.
-  if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() && program.find("series") != nullptr) {
+  if (command == nullptr && subject == "import" && std::find(args.begin(), args.end(), "--list") != args.end() &&
+      program.find("series") != nullptr) {
     args.erase(std::find(args.begin(), args.end(), "--list"));
     Command* const series = program.find("series");
     auto fields = series->fields();
@@ -234,7 +243,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {
       std::string list;
       for (const auto& p : wanted) list += p.optional ? " [" + p.name + "]" : " <" + p.name + ">";
-      throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list), "'osteo help " + subject + "' tells more");
+      throw Error(ExitCode::usage, "osteo " + subject + " takes" + (list.empty() ? " no arguments" : list),
+                  "'osteo help " + subject + "' tells more");
     }
     invocation.arguments = std::move(parsed.positionals);
     invocation.settings = std::move(parsed.settings);
@@ -271,7 +281,8 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
     return static_cast<int>(ExitCode::resources);
   } catch (const std::exception& e) {
     if (printer) printer->clear();
-    print_error(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"), err);
+    print_error(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"),
+                err);
     remove_temporaries();
     return static_cast<int>(ExitCode::unspecified);
   }

@@ -8,7 +8,9 @@
 namespace osteo::cli {
 
 ProgressPrinter::ProgressPrinter(ProgressStyle style, bool quiet, std::ostream& err, bool terminal)
-    : style_(style == ProgressStyle::automatic ? (terminal ? ProgressStyle::bar : ProgressStyle::none) : style), quiet_(quiet), err_(err),
+    : style_(style == ProgressStyle::automatic ? (terminal ? ProgressStyle::bar : ProgressStyle::none) : style),
+      quiet_(quiet),
+      err_(err),
       start_(std::chrono::steady_clock::now()) {
   if (quiet_) style_ = ProgressStyle::none;
 }
@@ -25,8 +27,8 @@ void ProgressPrinter::update(double fraction, std::string_view activity) {
     bar_shown_ = true;
     constexpr int kWidth = 30;
     const int filled = static_cast<int>(std::lround(fraction * kWidth));
-    err_ << "\r[" << std::string(static_cast<std::size_t>(filled), '#') << std::string(static_cast<std::size_t>(kWidth - filled), '.') << "] "
-         << static_cast<int>(fraction * 100) << " %  " << activity_ << "\x1b[K" << std::flush;
+    err_ << "\r[" << std::string(static_cast<std::size_t>(filled), '#') << std::string(static_cast<std::size_t>(kWidth - filled), '.')
+         << "] " << static_cast<int>(fraction * 100) << " %  " << activity_ << "\x1b[K" << std::flush;
     return;
   }
   // Machines read each step once, and never backwards.

@@ -41,7 +41,8 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
   if (!invocation.common.json) return;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const NodeResult& r : results) {
-    nlohmann::ordered_json o{{"id", r.id}, {"stage", r.stage}, {"reused", r.reused}, {"seconds", r.seconds}, {"params", r.params}, {"report", report_to_json(r.report)}};
+    nlohmann::ordered_json o{{"id", r.id},           {"stage", r.stage},   {"reused", r.reused},
+                             {"seconds", r.seconds}, {"params", r.params}, {"report", report_to_json(r.report)}};
     for (const auto& [port, path] : r.outputs) o["outputs"][port] = path.string();
     list.push_back(o);
   }

@@ -24,7 +24,10 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
 }
 
 BrickGrid::BrickGrid(const BrickGrid& other)
-    : frame_(other.frame_), extent_(other.extent_), table_(other.table_), origins_(other.origins_),
+    : frame_(other.frame_),
+      extent_(other.extent_),
+      table_(other.table_),
+      origins_(other.origins_),
       values_(std::make_unique_for_overwrite<float[]>(other.origins_.size() * kVoxels)) {
   for (std::size_t v = 0; v < origins_.size() * kVoxels; ++v) values_[v] = other.value(static_cast<VoxelKey>(v));
 }
@@ -32,7 +35,8 @@ BrickGrid::BrickGrid(const BrickGrid& other)
 void BrickGrid::read_block(Ijk lo, std::array<int, 3> n, float* out) const {
   for (int k = 0; k < n[2]; ++k) {
     for (int j = 0; j < n[1]; ++j) {
-      float* const row = out + (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(n[0]);
+      float* const row = out + (static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j)) *
+                                   static_cast<std::size_t>(n[0]);
       for (int i = 0; i < n[0];) {
         // One table look-up for each brick that the row crosses.
         const int x = lo.i + i, y = lo.j + j, z = lo.k + k;

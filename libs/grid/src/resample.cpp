@@ -34,10 +34,10 @@ std::vector<float> signed_field(const Image& ct, const Labels& mask, double lowe
 // How the samples of the output lie between the samples of the CT along one axis: four taps of a cubic (Catmull-Rom) each.
 // R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981.
 struct AxisMap {
-  int sub = 1;                                // sub-voxels along an output voxel
-  std::vector<int> first;                     // CT index of the first tap; may lie outside, where the border repeats
-  std::vector<std::array<float, 4>> weight;   // of the value
-  std::vector<std::array<float, 4>> slope;    // of the change across the sub-voxel
+  int sub = 1;                               // sub-voxels along an output voxel
+  std::vector<int> first;                    // CT index of the first tap; may lie outside, where the border repeats
+  std::vector<std::array<float, 4>> weight;  // of the value
+  std::vector<std::array<float, 4>> slope;   // of the change across the sub-voxel
 };
 
 AxisMap make_axis(int ct_dim, double ct_spacing, int out_dim, double out_spacing) {
@@ -64,7 +64,8 @@ struct Scratch {
 
 class Resampler {
  public:
-  Resampler(const Image& ct, const Labels& mask, const ResampleParams& p) : ct_(ct), field_(signed_field(ct, mask, p.lower)), h_(p.spacing_mm) {
+  Resampler(const Image& ct, const Labels& mask, const ResampleParams& p)
+      : ct_(ct), field_(signed_field(ct, mask, p.lower)), h_(p.spacing_mm) {
     frame_.direction = ct.frame.direction;
     frame_.spacing_mm = {h_, h_, h_};
     Vec3 first;
@@ -100,7 +101,8 @@ class Resampler {
     scratch.ct.resize(nx * ny * nz);
     for (std::size_t k = 0; k < nz; ++k) {
       for (std::size_t j = 0; j < ny; ++j) {
-        const float* const row = field_.data() + (inside(2, lo[2] + static_cast<int>(k)) * static_cast<std::size_t>(ct_.frame.dims[1]) + inside(1, lo[1] + static_cast<int>(j))) *
+        const float* const row = field_.data() + (inside(2, lo[2] + static_cast<int>(k)) * static_cast<std::size_t>(ct_.frame.dims[1]) +
+                                                  inside(1, lo[1] + static_cast<int>(j))) *
                                                      static_cast<std::size_t>(ct_.frame.dims[0]);
         for (std::size_t i = 0; i < nx; ++i) scratch.ct[(k * ny + j) * nx + i] = row[inside(0, lo[0] + static_cast<int>(i))];
       }
@@ -146,7 +148,9 @@ class Resampler {
           const float gx = along_z(scratch.xy, at, w), gy = along_z(scratch.dy, at, w), gz = along_z(scratch.y, at, d);
           // A plane cuts a cube over a width between the 2-norm and the 1-norm of this change.
           const float ramp = 0.5F * (std::sqrt(gx * gx + gy * gy + gz * gz) + std::abs(gx) + std::abs(gy) + std::abs(gz));
-          take(BrickGrid::offset_in_brick(static_cast<int>(i) / axis_[0].sub, static_cast<int>(j) / axis_[1].sub, static_cast<int>(k) / axis_[2].sub), value, std::max(ramp, 1e-3F), share);
+          take(BrickGrid::offset_in_brick(static_cast<int>(i) / axis_[0].sub, static_cast<int>(j) / axis_[1].sub,
+                                          static_cast<int>(k) / axis_[2].sub),
+               value, std::max(ramp, 1e-3F), share);
         }
       }
     }
@@ -154,7 +158,8 @@ class Resampler {
 
   // HU at the centre of an output voxel.
   [[nodiscard]] float hu_at(Ijk brick, std::uint32_t voxel) const {
-    const int v[3] = {brick.i * 8 + static_cast<int>(voxel & 7), brick.j * 8 + static_cast<int>(voxel >> 3 & 7), brick.k * 8 + static_cast<int>(voxel >> 6)};
+    const int v[3] = {brick.i * 8 + static_cast<int>(voxel & 7), brick.j * 8 + static_cast<int>(voxel >> 3 & 7),
+                      brick.k * 8 + static_cast<int>(voxel >> 6)};
     double x[3];
     int lo[3];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -180,7 +185,9 @@ class Resampler {
     std::size_t at = 0;
     for (int k = 0; k < ct_.frame.dims[2]; ++k) {
       for (int j = 0; j < ct_.frame.dims[1]; ++j) {
-        std::uint8_t* const row = occupied_.data() + (static_cast<std::size_t>(k / kBlock) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(j / kBlock)) * static_cast<std::size_t>(blocks_[0]);
+        std::uint8_t* const row = occupied_.data() + (static_cast<std::size_t>(k / kBlock) * static_cast<std::size_t>(blocks_[1]) +
+                                                      static_cast<std::size_t>(j / kBlock)) *
+                                                         static_cast<std::size_t>(blocks_[0]);
         for (int i = 0; i < ct_.frame.dims[0]; ++i, ++at) {
           if (field_[at] > -kForcedHu) row[i / kBlock] = 1;
         }
@@ -194,7 +201,8 @@ class Resampler {
     const auto range = [&](std::size_t a, int b) {
       const auto& m = axis_[a];
       const int last = std::min((b + 1) * kEdge, frame_.dims[a]) * m.sub - 1, top = ct_.frame.dims[a] - 1;
-      return std::pair{std::clamp(m.first[static_cast<std::size_t>(b * kEdge * m.sub)], 0, top) / kBlock, std::clamp(m.first[static_cast<std::size_t>(last)] + 3, 0, top) / kBlock};
+      return std::pair{std::clamp(m.first[static_cast<std::size_t>(b * kEdge * m.sub)], 0, top) / kBlock,
+                       std::clamp(m.first[static_cast<std::size_t>(last)] + 3, 0, top) / kBlock};
     };
     for (int k = 0; k < n[2]; ++k) {
       for (int j = 0; j < n[1]; ++j) {
@@ -206,7 +214,9 @@ class Resampler {
           for (int z = z0; z <= z1 && !any; ++z) {
             for (int y = y0; y <= y1 && !any; ++y) {
               for (int x = x0; x <= x1 && !any; ++x) {
-                any = occupied_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(blocks_[0]) + static_cast<std::size_t>(x)] != 0;
+                any = occupied_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(y)) *
+                                    static_cast<std::size_t>(blocks_[0]) +
+                                static_cast<std::size_t>(x)] != 0;
               }
             }
           }
@@ -227,7 +237,9 @@ class Resampler {
 };
 
 // Share of a sub-voxel inside, for a boundary that lies `offset` HU above the threshold.
-float coverage(float value, float ramp, float offset) { return std::clamp(0.5F + (value - offset) / ramp, 0.0F, 1.0F); }
+float coverage(float value, float ramp, float offset) {
+  return std::clamp(0.5F + (value - offset) / ramp, 0.0F, 1.0F);
+}
 
 // Volume for a row of offsets at once, summed in brick order.
 constexpr std::array<float, 9> kOffsets{-100, -50, -25, -10, 0, 10, 25, 50, 100};
@@ -271,7 +283,8 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   double voxels = 1;
   for (std::size_t a = 0; a < 3; ++a) voxels *= std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm);
   if (voxels > 4e10) {
-    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than 4*10^10", "choose a larger --spacing-mm");
+    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than 4*10^10",
+                "choose a larger --spacing-mm");
   }
   ResampledBone result;
   result.volume_before_mm3 = static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *
@@ -289,7 +302,9 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
     Scratch scratch;
     for (std::size_t b = begin; b < end; ++b) {
       std::array<float, kVoxels> d{};
-      resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t v, float value, float ramp, float weight) { d[v] += weight * coverage(value, ramp, offset); });
+      resampler.sample_brick(bricks[b], scratch, [&](std::uint32_t v, float value, float ramp, float weight) {
+        d[v] += weight * coverage(value, ramp, offset);
+      });
       // Traces are not worth a brick, nor is what a trace lacks to solid bone.
       for (float& x : d) x = x < kTrace ? 0 : x > 1 - kTrace ? 1 : x;
       if (std::none_of(d.begin(), d.end(), [](float x) { return x > 0; })) continue;
@@ -354,7 +369,8 @@ StageInfo ResampleStage::info() {
           .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
                       {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
-                         "R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981", "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
+                         "R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981",
+                         "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
           .example = "osteo resample ct.nrrd bone.nrrd bone.vdb --spacing-mm 0.5"};
 }
 

@@ -114,7 +114,8 @@ SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name) {
 }
 
 void save_grid(const SparseGrid& sparse, const fs::path& path) {
-  if (path.extension() != ".vdb") throw Error(ExitCode::usage, "cannot write a sparse grid as '" + path.filename().string() + "'", "name it .vdb");
+  if (path.extension() != ".vdb")
+    throw Error(ExitCode::usage, "cannot write a sparse grid as '" + path.filename().string() + "'", "name it .vdb");
   grid::initialize_vdb();
   const auto copy = std::const_pointer_cast<openvdb::FloatGrid>(sparse.impl->grid)->copy();  // shares the tree
   copy->setTransform(transform_of(sparse.frame));

@@ -78,7 +78,8 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
     if (centre[a] < -reach || centre[a] > dims[a] + reach) return result;
   }
   // Rounding to the nearest voxel, from a base that keeps the numbers positive: truncation is then floor.
-  const float cx = static_cast<float>(centre.x) + 64.5F, cy = static_cast<float>(centre.y) + 64.5F, cz = static_cast<float>(centre.z) + 64.5F;
+  const float cx = static_cast<float>(centre.x) + 64.5F, cy = static_cast<float>(centre.y) + 64.5F,
+              cz = static_cast<float>(centre.z) + 64.5F;
   float sx = 0, sy = 0, sz = 0;
   double density_sum = 0, weight_sum = 0;
   const std::size_t n = tool_->offset_index.size();
@@ -102,7 +103,8 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   result.bone_mm3 = density_sum * tool_->samples.sample_volume_mm3;
   result.depth_mm = cap_depth_mm(result.bone_mm3, tool_->burr.diameter_mm / 2);
   const double soft = std::min(result.depth_mm, params_.soft_depth_mm);
-  force_magnitude_n_ = std::min(params_.max_force_n, params_.soft_stiffness_n_per_mm * soft + params_.stiffness_n_per_mm * (result.depth_mm - soft));
+  force_magnitude_n_ =
+      std::min(params_.max_force_n, params_.soft_stiffness_n_per_mm * soft + params_.stiffness_n_per_mm * (result.depth_mm - soft));
   const Vec3 sum{static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz)};
   // Deep inside bone the pushes cancel and there is no direction: no force rather than a random one.
   const double strength = length(sum) / density_sum;

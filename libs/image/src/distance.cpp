@@ -60,9 +60,12 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
       }
     });
   };
-  run_axis(0, ny * nz, [&](std::size_t l) { return l * nx; }, 1);
-  run_axis(1, nx * nz, [&](std::size_t l) { return (l / nx) * nx * ny + l % nx; }, nx);
-  run_axis(2, nx * ny, [&](std::size_t l) { return l; }, nx * ny);
+  run_axis(
+      0, ny * nz, [&](std::size_t l) { return l * nx; }, 1);
+  run_axis(
+      1, nx * nz, [&](std::size_t l) { return (l / nx) * nx * ny + l % nx; }, nx);
+  run_axis(
+      2, nx * ny, [&](std::size_t l) { return l; }, nx * ny);
   return d;
 }
 

@@ -171,8 +171,12 @@ Frame phantom_frame(const PhantomParams& p) {
 
 }  // namespace
 
-std::string_view tissue_name(Tissue tissue) { return kNames[static_cast<std::size_t>(tissue)]; }
-double tissue_hu(Tissue tissue) { return kHu[static_cast<std::size_t>(tissue)]; }
+std::string_view tissue_name(Tissue tissue) {
+  return kNames[static_cast<std::size_t>(tissue)];
+}
+double tissue_hu(Tissue tissue) {
+  return kHu[static_cast<std::size_t>(tissue)];
+}
 
 Tissue phantom_tissue(Vec3 p) {
   Tissue tissue = Tissue::air;
@@ -208,7 +212,8 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
     std::vector<Tissue> corner(static_cast<std::size_t>(nx + 1) * static_cast<std::size_t>(ny + 1) * 2);
     const auto corner_at = [&](int i, int j, int s) -> Tissue& {
       return corner[(static_cast<std::size_t>(s) * static_cast<std::size_t>(ny + 1) + static_cast<std::size_t>(j)) *
-                        static_cast<std::size_t>(nx + 1) + static_cast<std::size_t>(i)];
+                        static_cast<std::size_t>(nx + 1) +
+                    static_cast<std::size_t>(i)];
     };
     for (int s = 0; s < 2; ++s) {
       for (int j = 0; j <= ny; ++j) {
@@ -218,7 +223,8 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
     double bone = 0;
     for (int j = 0; j < ny; ++j) {
       for (int i = 0; i < nx; ++i) {
-        const std::size_t at = (zb * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
+        const std::size_t at =
+            (zb * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
         const Vec3 centre = frame.world_from_index({double(i), double(j), double(k)});
         const Tissue t = phantom_tissue(centre);
         labels[at] = static_cast<std::uint8_t>(t);
@@ -230,8 +236,8 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
         if (!uniform || fine) {
           mean = share = 0;
           for (int s = 0; s < 27; ++s) {
-            const Tissue sample = phantom_tissue(frame.world_from_index(
-                {i + (s % 3 - 1) / 3.0, j + (s / 3 % 3 - 1) / 3.0, k + (s / 9 - 1) / 3.0}));
+            const Tissue sample =
+                phantom_tissue(frame.world_from_index({i + (s % 3 - 1) / 3.0, j + (s / 3 % 3 - 1) / 3.0, k + (s / 9 - 1) / 3.0}));
             mean += tissue_hu(sample) / 27;
             share += is_bone(sample) ? 1.0 / 27 : 0;
           }
@@ -266,8 +272,11 @@ StageInfo PhantomStage::info() {
               "only. Voxels hold the mean over their volume plus noise. Give a folder as output for a DICOM series.",
           .inputs = {},
           .outputs = {{"image", {DataKind::image}, "CT in HU"},
-                      {"labels", {DataKind::labels}, "exact tissue at each voxel centre: 2 cortical, 3 cellular, 4 mandible, "
-                                                     "5 ossicle, 6 facial nerve, 7 sigmoid sinus, 8 left marker", true}},
+                      {"labels",
+                       {DataKind::labels},
+                       "exact tissue at each voxel centre: 2 cortical, 3 cellular, 4 mandible, "
+                       "5 ossicle, 6 facial nerve, 7 sigmoid sinus, 8 left marker",
+                       true}},
           .references = {},
           .example = "osteo phantom ct.nrrd --labels-out labels.nrrd --region temporal --spacing-mm 0.5"};
 }

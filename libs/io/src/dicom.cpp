@@ -29,8 +29,8 @@
 namespace osteo {
 namespace {
 
-constexpr double kSamePlaceMm = 0.01;   // slices nearer than this lie at one place
-constexpr double kStraightMm = 0.02;    // deviation from an even, straight stack that is still called even and straight
+constexpr double kSamePlaceMm = 0.01;  // slices nearer than this lie at one place
+constexpr double kStraightMm = 0.02;   // deviation from an even, straight stack that is still called even and straight
 constexpr double kSameDirection = 1e-4;
 
 std::string text_of(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
@@ -39,7 +39,9 @@ std::string text_of(vtkDICOMMetaData* meta, vtkDICOMTag tag) {
   return text;
 }
 
-bool contains(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
 
 vtkSmartPointer<vtkDICOMMetaData> read_header(const fs::path& file) {
   require_readable(file);
@@ -85,7 +87,8 @@ Slice slice_of(const fs::path& file) {
   const vtkDICOMValue& spacing = meta->Get(DC::PixelSpacing);
   const std::string name = "'" + file.string() + "'";
   if (ipp.GetNumberOfValues() != 3 || iop.GetNumberOfValues() != 6) {
-    throw Error(ExitCode::corrupt, name + " states no position or orientation", "remove this file from the series, or ask for the original export");
+    throw Error(ExitCode::corrupt, name + " states no position or orientation",
+                "remove this file from the series, or ask for the original export");
   }
   if (spacing.GetNumberOfValues() != 2) throw Error(ExitCode::corrupt, name + " states no pixel spacing");
   Slice s;
@@ -114,8 +117,8 @@ void read_pixels(const Slice& s, std::int16_t* out) {
   reader->Update();
   const std::string name = "'" + s.file.string() + "'";
   if (reader->GetErrorCode() != vtkErrorCode::NoError) {
-    throw Error(ExitCode::corrupt, name + ": the pixels cannot be read: " +
-                                       std::string(vtkErrorCode::GetStringFromErrorCode(reader->GetErrorCode())),
+    throw Error(ExitCode::corrupt,
+                name + ": the pixels cannot be read: " + std::string(vtkErrorCode::GetStringFromErrorCode(reader->GetErrorCode())),
                 "the file may be cut short; copy it again from its source");
   }
   vtkDataArray* const scalars = reader->GetOutput()->GetPointData()->GetScalars();
@@ -130,12 +133,23 @@ void read_pixels(const Slice& s, std::int16_t* out) {
     }
   };
   switch (scalars->GetDataType()) {
-    case VTK_SHORT: convert(static_cast<const short*>(scalars->GetVoidPointer(0))); break;
-    case VTK_UNSIGNED_SHORT: convert(static_cast<const unsigned short*>(scalars->GetVoidPointer(0))); break;
-    case VTK_UNSIGNED_CHAR: convert(static_cast<const unsigned char*>(scalars->GetVoidPointer(0))); break;
-    case VTK_SIGNED_CHAR: convert(static_cast<const signed char*>(scalars->GetVoidPointer(0))); break;
-    case VTK_INT: convert(static_cast<const int*>(scalars->GetVoidPointer(0))); break;
-    default: throw Error(ExitCode::corrupt, name + " holds an unusual pixel type");
+    case VTK_SHORT:
+      convert(static_cast<const short*>(scalars->GetVoidPointer(0)));
+      break;
+    case VTK_UNSIGNED_SHORT:
+      convert(static_cast<const unsigned short*>(scalars->GetVoidPointer(0)));
+      break;
+    case VTK_UNSIGNED_CHAR:
+      convert(static_cast<const unsigned char*>(scalars->GetVoidPointer(0)));
+      break;
+    case VTK_SIGNED_CHAR:
+      convert(static_cast<const signed char*>(scalars->GetVoidPointer(0)));
+      break;
+    case VTK_INT:
+      convert(static_cast<const int*>(scalars->GetVoidPointer(0)));
+      break;
+    default:
+      throw Error(ExitCode::corrupt, name + " holds an unusual pixel type");
   }
 }
 
@@ -151,12 +165,14 @@ std::vector<Slice> sorted_slices(const DicomSeries& series, double max_gap_mm, c
   for (Slice& s : slices) {
     const std::string name = "'" + s.file.string() + "'";
     if (s.columns != first.columns || s.rows != first.rows) {
-      throw Error(ExitCode::corrupt, name + " has " + std::to_string(s.columns) + "x" + std::to_string(s.rows) + " pixels, others " +
-                                         std::to_string(first.columns) + "x" + std::to_string(first.rows),
+      throw Error(ExitCode::corrupt,
+                  name + " has " + std::to_string(s.columns) + "x" + std::to_string(s.rows) + " pixels, others " +
+                      std::to_string(first.columns) + "x" + std::to_string(first.rows),
                   "remove the file, or export the series again");
     }
     if (length(s.u - first.u) > kSameDirection || length(s.v - first.v) > kSameDirection) {
-      throw Error(ExitCode::corrupt, name + " is oriented differently from the other slices", "the series holds several stacks; export one");
+      throw Error(ExitCode::corrupt, name + " is oriented differently from the other slices",
+                  "the series holds several stacks; export one");
     }
     if (std::abs(s.du - first.du) > 1e-4 || std::abs(s.dv - first.dv) > 1e-4) {
       throw Error(ExitCode::corrupt, name + " has another pixel spacing than the other slices");
@@ -171,8 +187,9 @@ std::vector<Slice> sorted_slices(const DicomSeries& series, double max_gap_mm, c
                   "the series holds duplicates or several acquisitions; export one");
     }
     if (gap > max_gap_mm) {
-      throw Error(ExitCode::failed, "between '" + slices[i - 1].file.string() + "' and '" + slices[i].file.string() + "' there is a gap of " +
-                                        format_number(std::round(gap * 1000) / 1000) + " mm",
+      throw Error(ExitCode::failed,
+                  "between '" + slices[i - 1].file.string() + "' and '" + slices[i].file.string() + "' there is a gap of " +
+                      format_number(std::round(gap * 1000) / 1000) + " mm",
                   "look for missing slices; --max-gap-mm accepts wider gaps");
     }
   }
@@ -279,7 +296,8 @@ Image load_dicom_series(const DicomSeries& series, double max_gap_mm, const Cont
 
   // Tilted or uneven: straight slices at the finest gap (at most 1 mm, at least a pixel), wide enough for all of the lean.
   context.report("resampled", true);
-  context.info("the slices are " + std::string(tilt_deg > 0.05 ? "tilted" : "unevenly spaced") + "; resampling them onto straight, even ones");
+  context.info("the slices are " + std::string(tilt_deg > 0.05 ? "tilted" : "unevenly spaced") +
+               "; resampling them onto straight, even ones");
   double u_lo = 0, u_hi = 0, v_lo = 0, v_hi = 0;
   for (const Slice& s : slices) {
     const Vec3 d = s.position - first.position;
@@ -320,7 +338,8 @@ Image load_dicom_series(const DicomSeries& series, double max_gap_mm, const Cont
             const int ii = i0 + (c & 1), jj = j0 + (c >> 1);
             const double w = share * ((c & 1) != 0 ? i - i0 : 1 - (i - i0)) * ((c >> 1) != 0 ? j - j0 : 1 - (j - j0));
             if (w <= 0 || ii < 0 || jj < 0 || ii >= first.columns || jj >= first.rows) continue;
-            sum += w * pixels[k * area + static_cast<std::size_t>(jj) * static_cast<std::size_t>(first.columns) + static_cast<std::size_t>(ii)];
+            sum += w *
+                   pixels[k * area + static_cast<std::size_t>(jj) * static_cast<std::size_t>(first.columns) + static_cast<std::size_t>(ii)];
             weight += w;
           }
         }
@@ -367,9 +386,11 @@ void save_dicom_series(const Image& image, const fs::path& folder, const Context
     writer->SetFilePrefix(temporary.c_str());
     writer->SetFilePattern("%s/%04d.dcm");
     writer->Write();
-    if (writer->GetErrorCode() != 0) {
-      throw Error(ExitCode::cannot_write, "cannot write DICOM files to '" + folder.string() + "': " + quiet.first_message(),
-                  "see that the disk has room");
+    if (writer->GetErrorCode() != 0) throw io::write_error(folder, writer->GetErrorCode());
+    const std::size_t slice_bytes = image.frame.voxel_count() / static_cast<std::size_t>(image.frame.dims[2]) * sizeof(std::int16_t);
+    for (const auto& entry : fs::directory_iterator(temporary)) {
+      // vtk-dicom does not look whether its bytes arrived.
+      if (entry.file_size() < slice_bytes) throw io::write_error(folder, vtkErrorCode::OutOfDiskSpaceError);
     }
     context.progress(1.0);
   });

@@ -37,7 +37,8 @@ Mat3 direction_of(const std::string& axes) {
     used |= 1 << kAxis[at];
   }
   if (used != 7) {
-    throw Error(ExitCode::usage, "--axes: '" + axes + "' is not three letters, one of L R, one of A P, one of S I", "LPS is the usual order; LPI when the first slice is the top of the head");
+    throw Error(ExitCode::usage, "--axes: '" + axes + "' is not three letters, one of L R, one of A P, one of S I",
+                "LPS is the usual order; LPI when the first slice is the top of the head");
   }
   return m;
 }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "osteo/base/error.h"
-#include "osteo/base/param.h"
 #include "osteo/base/parallel.h"
+#include "osteo/base/param.h"
 
 namespace osteo::io {
 namespace {
@@ -14,14 +14,30 @@ template <class F>
 void visit_scalars(const RawVolume& raw, F&& f) {
   const void* const p = raw.data.get();
   switch (raw.type) {
-    case Scalar::u8: f(static_cast<const std::uint8_t*>(p)); break;
-    case Scalar::i8: f(static_cast<const std::int8_t*>(p)); break;
-    case Scalar::u16: f(static_cast<const std::uint16_t*>(p)); break;
-    case Scalar::i16: f(static_cast<const std::int16_t*>(p)); break;
-    case Scalar::u32: f(static_cast<const std::uint32_t*>(p)); break;
-    case Scalar::i32: f(static_cast<const std::int32_t*>(p)); break;
-    case Scalar::f32: f(static_cast<const float*>(p)); break;
-    case Scalar::f64: f(static_cast<const double*>(p)); break;
+    case Scalar::u8:
+      f(static_cast<const std::uint8_t*>(p));
+      break;
+    case Scalar::i8:
+      f(static_cast<const std::int8_t*>(p));
+      break;
+    case Scalar::u16:
+      f(static_cast<const std::uint16_t*>(p));
+      break;
+    case Scalar::i16:
+      f(static_cast<const std::int16_t*>(p));
+      break;
+    case Scalar::u32:
+      f(static_cast<const std::uint32_t*>(p));
+      break;
+    case Scalar::i32:
+      f(static_cast<const std::int32_t*>(p));
+      break;
+    case Scalar::f32:
+      f(static_cast<const float*>(p));
+      break;
+    case Scalar::f64:
+      f(static_cast<const double*>(p));
+      break;
   }
 }
 
@@ -30,13 +46,17 @@ void visit_scalars(const RawVolume& raw, F&& f) {
 std::size_t size_of(Scalar type) {
   switch (type) {
     case Scalar::u8:
-    case Scalar::i8: return 1;
+    case Scalar::i8:
+      return 1;
     case Scalar::u16:
-    case Scalar::i16: return 2;
+    case Scalar::i16:
+      return 2;
     case Scalar::u32:
     case Scalar::i32:
-    case Scalar::f32: return 4;
-    case Scalar::f64: return 8;
+    case Scalar::f32:
+      return 4;
+    case Scalar::f64:
+      return 8;
   }
   return 0;
 }

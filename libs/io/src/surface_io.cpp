@@ -5,24 +5,45 @@
 #include <vtkOBJReader.h>
 #include <vtkOBJWriter.h>
 #include <vtkPLYReader.h>
-#include <vtkPLYWriter.h>
 #include <vtkPNGReader.h>
 #include <vtkPNGWriter.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
 #include <vtkSTLWriter.h>
+#include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/io/vtk_data.h"
+#include "vtk_volume.h"
 
 namespace osteo {
 namespace {
 
 constexpr const char* kHeader = "Osteotome; LPS; mm";
+
+// Binary PLY, made here: vtkPLYWriter does not look whether its bytes reach the disk.
+std::string ply_text(const TriMesh& mesh) {
+  const bool normals = mesh.normals.size() == mesh.points_mm.size();
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment " + std::string(kHeader) + "\nelement vertex " +
+                     std::to_string(mesh.points_mm.size()) + "\nproperty float x\nproperty float y\nproperty float z\n" +
+                     (normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") + "element face " +
+                     std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
+  const auto append = [&](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  text.reserve(text.size() + mesh.points_mm.size() * (normals ? 24 : 12) + mesh.triangles.size() * 13);
+  for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
+    append(mesh.points_mm[p]);
+    if (normals) append(mesh.normals[p]);
+  }
+  for (const auto& t : mesh.triangles) {
+    append(std::uint8_t{3});
+    append(t);
+  }
+  return text;
+}
 
 template <class Reader>
 vtkSmartPointer<vtkPolyData> read_with(const fs::path& path) {
@@ -42,9 +63,7 @@ void write_with(Writer* writer, vtkPolyData* data, const fs::path& path) {
     const QuietVtk quiet;
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(data);
-    if (writer->Write() == 0 || writer->GetErrorCode() != 0) {
-      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + quiet.first_message(), "see that the disk has room");
-    }
+    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw io::write_error(path, writer->GetErrorCode());
   });
 }
 
@@ -63,7 +82,8 @@ Surface load_surface(const fs::path& path) {
   if (e == ".stl") poly = read_with<vtkSTLReader>(path);
   if (e == ".obj") poly = read_with<vtkOBJReader>(path);
   if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
-  if (!poly) throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");
+  if (!poly)
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");
   try {
     auto mesh = std::make_shared<TriMesh>(mesh_from_vtk(poly));
     if (mesh->triangles.empty()) throw Error(ExitCode::corrupt, "it holds no triangles");
@@ -77,10 +97,7 @@ void save_surface(const TriMesh& mesh, const fs::path& path) {
   const auto poly = to_vtk(mesh);
   const auto e = path.extension();
   if (e == ".ply") {
-    vtkNew<vtkPLYWriter> writer;
-    writer->SetFileTypeToBinary();
-    writer->AddComment(kHeader);
-    write_with(writer.Get(), poly, path);
+    write_file(path, ply_text(mesh));
   } else if (e == ".stl") {
     vtkNew<vtkSTLWriter> writer;
     writer->SetFileTypeToBinary();
@@ -109,16 +126,12 @@ void save_picture(const Picture& picture, const fs::path& path) {
     std::copy_n(picture.rgb.data() + static_cast<std::size_t>(picture.height - 1 - y) * row, row,
                 static_cast<unsigned char*>(image->GetScalarPointer(0, y, 0)));
   }
-  write_atomically(path, [&](const fs::path& temporary) {
-    const QuietVtk quiet;
-    vtkNew<vtkPNGWriter> writer;
-    writer->SetFileName(temporary.c_str());
-    writer->SetInputData(image);
-    writer->Write();
-    if (writer->GetErrorCode() != 0) {
-      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "'", "see that the disk has room");
-    }
-  });
+  vtkNew<vtkPNGWriter> writer;
+  writer->WriteToMemoryOn();
+  writer->SetInputData(image);
+  writer->Write();
+  vtkUnsignedCharArray* const bytes = writer->GetResult();
+  write_file(path, {reinterpret_cast<const char*>(bytes->GetPointer(0)), static_cast<std::size_t>(bytes->GetNumberOfValues())});
 }
 
 Picture load_picture(const fs::path& path) {

@@ -56,7 +56,9 @@ void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path)
 
 }  // namespace
 
-bool is_volume_file(const fs::path& path) { return format_of(path) != nullptr; }
+bool is_volume_file(const fs::path& path) {
+  return format_of(path) != nullptr;
+}
 Image load_image(const fs::path& path, const Context& context) {
   const auto raw = load_raw(path, context);
   try {
@@ -73,8 +75,14 @@ Labels load_labels(const fs::path& path, const Context& context) {
     throw e.in("'" + path.string() + "'");
   }
 }
-bool holds_labels(const fs::path& path, const Context& context) { return load_raw(path, context).type == io::Scalar::u8; }
-void save_image(const Image& image, const fs::path& path) { save_volume(image, io::Scalar::i16, path); }
-void save_labels(const Labels& labels, const fs::path& path) { save_volume(labels, io::Scalar::u8, path); }
+bool holds_labels(const fs::path& path, const Context& context) {
+  return load_raw(path, context).type == io::Scalar::u8;
+}
+void save_image(const Image& image, const fs::path& path) {
+  save_volume(image, io::Scalar::i16, path);
+}
+void save_labels(const Labels& labels, const fs::path& path) {
+  save_volume(labels, io::Scalar::u8, path);
+}
 
 }  // namespace osteo

@@ -76,11 +76,19 @@ vtkStandardNewMacro(Collector);
 
 }  // namespace
 
-vtkSmartPointer<vtkImageData> to_vtk(const Image& image) { return wrap<vtkShortArray>(image, "HU"); }
-vtkSmartPointer<vtkImageData> to_vtk(const Labels& labels) { return wrap<vtkUnsignedCharArray>(labels, "labels"); }
+vtkSmartPointer<vtkImageData> to_vtk(const Image& image) {
+  return wrap<vtkShortArray>(image, "HU");
+}
+vtkSmartPointer<vtkImageData> to_vtk(const Labels& labels) {
+  return wrap<vtkUnsignedCharArray>(labels, "labels");
+}
 
-Image image_from_vtk(vtkImageData* data) { return io::image_from(io::raw_from_vtk(data), {}); }
-Labels labels_from_vtk(vtkImageData* data) { return io::labels_from(io::raw_from_vtk(data)); }
+Image image_from_vtk(vtkImageData* data) {
+  return io::image_from(io::raw_from_vtk(data), {});
+}
+Labels labels_from_vtk(vtkImageData* data) {
+  return io::labels_from(io::raw_from_vtk(data));
+}
 
 vtkSmartPointer<vtkPolyData> to_vtk(const TriMesh& mesh) {
   auto poly = vtkSmartPointer<vtkPolyData>::New();
@@ -155,7 +163,8 @@ std::string QuietVtk::first_message() const {
   const std::lock_guard lock(impl_->collector->mutex);
   std::string text = impl_->collector->first;
   if (const auto colon = text.find("): "); colon != std::string::npos) text = text.substr(colon + 3);
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  text = text.substr(0, text.find('\n'));
+  while (!text.empty() && text.back() == ' ') text.pop_back();
   return text;
 }
 

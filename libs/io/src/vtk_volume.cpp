@@ -2,6 +2,7 @@
 #include "vtk_volume.h"
 
 #include <vtkDataArray.h>
+#include <vtkErrorCode.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
@@ -15,6 +16,7 @@
 #include <vtkmetaio/metaImage.h>
 
 #include <cstring>
+#include <iostream>
 
 #include <cmath>
 
@@ -28,14 +30,22 @@ namespace {
 
 int vtk_type(Scalar s) {
   switch (s) {
-    case Scalar::u8: return VTK_UNSIGNED_CHAR;
-    case Scalar::i8: return VTK_SIGNED_CHAR;
-    case Scalar::u16: return VTK_UNSIGNED_SHORT;
-    case Scalar::i16: return VTK_SHORT;
-    case Scalar::u32: return VTK_UNSIGNED_INT;
-    case Scalar::i32: return VTK_INT;
-    case Scalar::f32: return VTK_FLOAT;
-    case Scalar::f64: return VTK_DOUBLE;
+    case Scalar::u8:
+      return VTK_UNSIGNED_CHAR;
+    case Scalar::i8:
+      return VTK_SIGNED_CHAR;
+    case Scalar::u16:
+      return VTK_UNSIGNED_SHORT;
+    case Scalar::i16:
+      return VTK_SHORT;
+    case Scalar::u32:
+      return VTK_UNSIGNED_INT;
+    case Scalar::i32:
+      return VTK_INT;
+    case Scalar::f32:
+      return VTK_FLOAT;
+    case Scalar::f64:
+      return VTK_DOUBLE;
   }
   return VTK_VOID;
 }
@@ -52,11 +62,20 @@ Scalar scalar_from_vtk(int type) {
   throw Error(ExitCode::corrupt, "'" + path.string() + "': " + what, advice);
 }
 
-Error checked_write(const fs::path& path, const QuietVtk& quiet) {
-  const std::string message = quiet.first_message();
-  return {ExitCode::cannot_write, "cannot write '" + path.string() + "'" + (message.empty() ? "" : ": " + message),
-          "see that the disk has room and the folder may be written"};
-}
+// MetaIO tells its troubles to std::cerr: ours are enough.
+class QuietCerr {
+ public:
+  QuietCerr() : before_(std::cerr.rdbuf(nullptr)) {}
+  ~QuietCerr() {
+    std::cerr.rdbuf(before_);
+    std::cerr.clear();
+  }
+  QuietCerr(const QuietCerr&) = delete;
+  QuietCerr& operator=(const QuietCerr&) = delete;
+
+ private:
+  std::streambuf* before_;
+};
 
 // LPS frame from a RAS matrix whose columns include the spacing.
 void frame_from_ras(Frame& frame, const vtkMatrix4x4* m, Vec3 spacing) {
@@ -71,6 +90,12 @@ void frame_from_ras(Frame& frame, const vtkMatrix4x4* m, Vec3 spacing) {
 }
 
 }  // namespace
+
+Error write_error(const fs::path& path, unsigned long vtk_error_code) {
+  const bool full = vtk_error_code == vtkErrorCode::OutOfDiskSpaceError;
+  return {ExitCode::cannot_write, "cannot write '" + path.string() + "'" + (full ? ": No space left on device" : ""),
+          "see that the disk has room and the folder may be written"};
+}
 
 void set_frame(vtkImageData* image, const Frame& f) {
   image->SetDimensions(f.dims[0], f.dims[1], f.dims[2]);
@@ -129,7 +154,7 @@ void write_vti(const RawVolume& raw, const fs::path& path) {
     vtkNew<vtkXMLImageDataWriter> writer;
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(vtk_view(raw));
-    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw checked_write(path, quiet);
+    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw write_error(path, writer->GetErrorCode());
   });
 }
 
@@ -181,7 +206,8 @@ RawVolume with_slices_reversed(const RawVolume& raw) {
   out.frame.direction.column[2] = -raw.frame.direction.column[2];
   const std::size_t slice = raw.frame.voxel_count() / nz * size_of(raw.type);
   const auto bytes = std::make_shared_for_overwrite<std::byte[]>(slice * nz);
-  for (std::size_t k = 0; k < nz; ++k) std::memcpy(bytes.get() + k * slice, static_cast<const std::byte*>(raw.data.get()) + (nz - 1 - k) * slice, slice);
+  for (std::size_t k = 0; k < nz; ++k)
+    std::memcpy(bytes.get() + k * slice, static_cast<const std::byte*>(raw.data.get()) + (nz - 1 - k) * slice, slice);
   out.data = std::shared_ptr<const void>(bytes, bytes.get());
   return out;
 }
@@ -213,7 +239,7 @@ void write_nifti(const RawVolume& given, const fs::path& path) {
     writer->SetSFormMatrix(ras);
     writer->SetDescription("Osteotome");
     writer->Write();
-    if (writer->GetErrorCode() != 0) throw checked_write(path, quiet);
+    if (writer->GetErrorCode() != 0) throw write_error(path, writer->GetErrorCode());
   });
 }
 
@@ -251,7 +277,8 @@ void require_whole_meta(const fs::path& path) {
     there = fs::file_size(path.parent_path() / data_file);
   }
   if (static_cast<double>(there) < parse_number(size, "CompressedDataSize")) {
-    fail(path, "it holds " + std::to_string(there) + " bytes of packed voxels but needs " + size, "the file was cut short; copy it again from its source");
+    fail(path, "it holds " + std::to_string(there) + " bytes of packed voxels but needs " + size,
+         "the file was cut short; copy it again from its source");
   }
 }
 
@@ -259,20 +286,38 @@ RawVolume read_meta(const fs::path& path) {
   require_readable(path);
   require_whole_meta(path);
   vtkmetaio::MetaImage meta;
+  const QuietCerr quiet;
   if (!meta.Read(path.c_str(), true)) fail(path, "cannot be read as MetaImage", "the file may be cut short or its data file missing");
   if (meta.NDims() != 3) fail(path, "it has " + std::to_string(meta.NDims()) + " axes; a volume has three");
   if (meta.ElementNumberOfChannels() != 1) fail(path, "it has several channels; a CT has one");
   RawVolume raw;
   switch (meta.ElementType()) {
-    case vtkmetaio::MET_UCHAR: raw.type = Scalar::u8; break;
-    case vtkmetaio::MET_CHAR: raw.type = Scalar::i8; break;
-    case vtkmetaio::MET_USHORT: raw.type = Scalar::u16; break;
-    case vtkmetaio::MET_SHORT: raw.type = Scalar::i16; break;
-    case vtkmetaio::MET_UINT: raw.type = Scalar::u32; break;
-    case vtkmetaio::MET_INT: raw.type = Scalar::i32; break;
-    case vtkmetaio::MET_FLOAT: raw.type = Scalar::f32; break;
-    case vtkmetaio::MET_DOUBLE: raw.type = Scalar::f64; break;
-    default: fail(path, "its element type is not supported");
+    case vtkmetaio::MET_UCHAR:
+      raw.type = Scalar::u8;
+      break;
+    case vtkmetaio::MET_CHAR:
+      raw.type = Scalar::i8;
+      break;
+    case vtkmetaio::MET_USHORT:
+      raw.type = Scalar::u16;
+      break;
+    case vtkmetaio::MET_SHORT:
+      raw.type = Scalar::i16;
+      break;
+    case vtkmetaio::MET_UINT:
+      raw.type = Scalar::u32;
+      break;
+    case vtkmetaio::MET_INT:
+      raw.type = Scalar::i32;
+      break;
+    case vtkmetaio::MET_FLOAT:
+      raw.type = Scalar::f32;
+      break;
+    case vtkmetaio::MET_DOUBLE:
+      raw.type = Scalar::f64;
+      break;
+    default:
+      fail(path, "its element type is not supported");
   }
   for (int a = 0; a < 3; ++a) {
     const auto ua = static_cast<std::size_t>(a);
@@ -300,14 +345,30 @@ void write_meta(const RawVolume& raw, const fs::path& path) {
   write_atomically(path, [&](const fs::path& temporary) {
     vtkmetaio::MET_ValueEnumType type = vtkmetaio::MET_SHORT;
     switch (raw.type) {
-      case Scalar::u8: type = vtkmetaio::MET_UCHAR; break;
-      case Scalar::i8: type = vtkmetaio::MET_CHAR; break;
-      case Scalar::u16: type = vtkmetaio::MET_USHORT; break;
-      case Scalar::i16: type = vtkmetaio::MET_SHORT; break;
-      case Scalar::u32: type = vtkmetaio::MET_UINT; break;
-      case Scalar::i32: type = vtkmetaio::MET_INT; break;
-      case Scalar::f32: type = vtkmetaio::MET_FLOAT; break;
-      case Scalar::f64: type = vtkmetaio::MET_DOUBLE; break;
+      case Scalar::u8:
+        type = vtkmetaio::MET_UCHAR;
+        break;
+      case Scalar::i8:
+        type = vtkmetaio::MET_CHAR;
+        break;
+      case Scalar::u16:
+        type = vtkmetaio::MET_USHORT;
+        break;
+      case Scalar::i16:
+        type = vtkmetaio::MET_SHORT;
+        break;
+      case Scalar::u32:
+        type = vtkmetaio::MET_UINT;
+        break;
+      case Scalar::i32:
+        type = vtkmetaio::MET_INT;
+        break;
+      case Scalar::f32:
+        type = vtkmetaio::MET_FLOAT;
+        break;
+      case Scalar::f64:
+        type = vtkmetaio::MET_DOUBLE;
+        break;
     }
     const Frame& f = raw.frame;
     const int dims[3] = {f.dims[0], f.dims[1], f.dims[2]};
@@ -323,8 +384,12 @@ void write_meta(const RawVolume& raw, const fs::path& path) {
     meta.CompressedData(true);
     meta.BinaryData(true);
     meta.SetDoublePrecision(17);
-    if (!meta.Write(temporary.c_str(), "LOCAL")) {
-      throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "'", "see that the disk has room");
+    const QuietCerr quiet;
+    if (!meta.Write(temporary.c_str(), "LOCAL")) throw write_error(path, 0);
+    try {
+      require_whole_meta(temporary);  // MetaIO does not look whether its bytes arrived
+    } catch (const Error&) {
+      throw write_error(path, vtkErrorCode::OutOfDiskSpaceError);
     }
   });
 }

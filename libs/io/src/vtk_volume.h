@@ -2,11 +2,15 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
+#include "osteo/base/error.h"
 #include "raw_volume.h"
 
 class vtkImageData;
 
 namespace osteo::io {
+
+/// What to throw when a VTK writer failed: says "no space left" when that was it.
+[[nodiscard]] Error write_error(const std::filesystem::path& path, unsigned long vtk_error_code);
 
 void set_frame(vtkImageData* image, const Frame& frame);
 /// Shares the scalars.

@@ -10,8 +10,8 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "osteo/base/parallel.h"
 #include "index_rows.h"
+#include "osteo/base/parallel.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
@@ -28,7 +28,8 @@ constexpr std::array<std::array<int, 4>, 6> kFaces{{{0, 2, 6, 4}, {1, 3, 7, 5}, 
 constexpr int edge_between(int a, int b) {
   for (int e = 0; e < 12; ++e) {
     if ((kEdges[static_cast<std::size_t>(e)].from == a && kEdges[static_cast<std::size_t>(e)].to == b) ||
-        (kEdges[static_cast<std::size_t>(e)].from == b && kEdges[static_cast<std::size_t>(e)].to == a)) return e;
+        (kEdges[static_cast<std::size_t>(e)].from == b && kEdges[static_cast<std::size_t>(e)].to == a))
+      return e;
   }
   return -1;
 }
@@ -191,7 +192,8 @@ class PatchBuilder {
 
   // The area vector of the polygon in which a sheet cuts the faces of its cell. It needs no neighbours, so both sides of a
   // wall one voxel thin get their own; density gradients would cancel there.
-  static std::array<float, 3> sheet_normal(const CellSheets& cell, std::uint8_t sheet, const std::array<std::array<float, 3>, 12>& crossing) {
+  static std::array<float, 3> sheet_normal(const CellSheets& cell, std::uint8_t sheet,
+                                           const std::array<std::array<float, 3>, 12>& crossing) {
     std::array<float, 3> area{0, 0, 0};
     for (unsigned f = 0; f < 6; ++f) {
       const auto& c = kFaces[f];
@@ -251,13 +253,15 @@ class PatchBuilder {
     const auto part = [](int x) { return static_cast<std::uint64_t>(x + 1); };
     const std::uint64_t key = ((part(cell.k) << 20 | part(cell.j)) << 20 | part(cell.i)) << 4 | sheet;
     vertex = static_cast<std::uint32_t>(patch_.vertices.size());
-    patch_.vertices.push_back({{static_cast<float>(cell.i) + at[0], static_cast<float>(cell.j) + at[1], static_cast<float>(cell.k) + at[2]}, g, key});
+    patch_.vertices.push_back(
+        {{static_cast<float>(cell.i) + at[0], static_cast<float>(cell.j) + at[1], static_cast<float>(cell.k) + at[2]}, g, key});
     return vertex;
   }
 
   // The quad across the edge from bone voxel (i,j,k) to its empty neighbour at `side` of `axis`.
   void add_quad(int i, int j, int k, int axis, int side) {
-    const std::array<int, 3> low{i - (axis == 0 && side == 0 ? 1 : 0), j - (axis == 1 && side == 0 ? 1 : 0), k - (axis == 2 && side == 0 ? 1 : 0)};
+    const std::array<int, 3> low{i - (axis == 0 && side == 0 ? 1 : 0), j - (axis == 1 && side == 0 ? 1 : 0),
+                                 k - (axis == 2 && side == 0 ? 1 : 0)};
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     // Four cells around the edge, counter-clockwise seen from the high end of the axis.
     constexpr std::array<std::array<int, 2>, 4> kAround{{{-1, -1}, {0, -1}, {0, 0}, {-1, 0}}};
@@ -334,8 +338,10 @@ BoneSurface join_patches(const BrickGrid& bone, std::span<const SurfacePatch> pa
       } else {
         global[v] = fresh;
       }
-      const Vec3 p = frame.world_from_index({static_cast<double>(vertex.index[0]), static_cast<double>(vertex.index[1]), static_cast<double>(vertex.index[2])});
-      const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(vertex.normal[0]), static_cast<double>(vertex.normal[1]), static_cast<double>(vertex.normal[2])});
+      const Vec3 p = frame.world_from_index(
+          {static_cast<double>(vertex.index[0]), static_cast<double>(vertex.index[1]), static_cast<double>(vertex.index[2])});
+      const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(vertex.normal[0]), static_cast<double>(vertex.normal[1]),
+                                                       static_cast<double>(vertex.normal[2])});
       result.mesh.points_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
       result.mesh.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
     }

@@ -75,25 +75,27 @@ Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface
 }  // namespace
 
 StageInfo SurfaceStage::info() {
-  return {.name = "surface",
-          .version = 1,
-          .synopsis = "triangle surface of a bone density grid",
-          .description =
-              "nets: one vertex for each sheet of surface between eight voxels; closed, oriented and manifold for any bone. "
-              "voxel: each vertex is a voxel on the surface, as in the thesis, without hidden triangles. "
-              "Reports counts, closedness, enclosed volume, and the distance to marching cubes of the same voxels.",
-          .inputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"}},
-          .outputs = {{"surface", {DataKind::surface}, "triangles in LPS mm, facing out of the bone"}},
-          .references = {"S. Gibson, Constrained Elastic Surface Nets, MERL 1998", "G. Nielson, Dual Marching Cubes, IEEE Visualization 2004",
-                         "R. Wenger, Isosurfaces: Geometry, Topology, and Algorithms, 2013",
-                         "D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.2"},
-          .example = "osteo surface bone.vdb bone.ply"};
+  return {
+      .name = "surface",
+      .version = 1,
+      .synopsis = "triangle surface of a bone density grid",
+      .description =
+          "nets: one vertex for each sheet of surface between eight voxels; closed, oriented and manifold for any bone. "
+          "voxel: each vertex is a voxel on the surface, as in the thesis, without hidden triangles. "
+          "Reports counts, closedness, enclosed volume, and the distance to marching cubes of the same voxels.",
+      .inputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"}},
+      .outputs = {{"surface", {DataKind::surface}, "triangles in LPS mm, facing out of the bone"}},
+      .references = {"S. Gibson, Constrained Elastic Surface Nets, MERL 1998", "G. Nielson, Dual Marching Cubes, IEEE Visualization 2004",
+                     "R. Wenger, Isosurfaces: Geometry, Topology, and Algorithms, 2013",
+                     "D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.2"},
+      .example = "osteo surface bone.vdb bone.ply"};
 }
 
 std::vector<Data> SurfaceStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const BrickGrid bone = to_bricks(std::get<SparseGrid>(inputs[0]));
   const auto iso = static_cast<float>(p.iso);
-  BoneSurface surface = p.method == SurfaceMethod::nets ? surface_nets(bone, iso, context.sub(0, 0.6)) : voxel_surface(bone, iso, context.sub(0, 0.6));
+  BoneSurface surface =
+      p.method == SurfaceMethod::nets ? surface_nets(bone, iso, context.sub(0, 0.6)) : voxel_surface(bone, iso, context.sub(0, 0.6));
   if (surface.mesh.triangles.empty()) throw Error(ExitCode::failed, "the grid has no surface at density " + format_number(p.iso));
   context.progress(0.6, "checking");
   const MeshCheck checked = check(surface.mesh);

@@ -3,19 +3,21 @@
 #include <array>
 #include <cmath>
 
-#include "osteo/base/parallel.h"
 #include "index_rows.h"
+#include "osteo/base/parallel.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
 
 namespace {
 
-constexpr std::array<int, 3> corner(int c) { return {c & 1, c >> 1 & 1, c >> 2}; }
+constexpr std::array<int, 3> corner(int c) {
+  return {c & 1, c >> 1 & 1, c >> 2};
+}
 
 struct Candidate {
-  std::array<std::uint8_t, 3> c;     // corners, ascending
-  std::array<float, 3> normal;       // right-hand rule, not unit
+  std::array<std::uint8_t, 3> c;      // corners, ascending
+  std::array<float, 3> normal;        // right-hand rule, not unit
   std::uint8_t above = 0, below = 0;  // corners of the cell strictly on either side
   int face = -1;                      // the cell face that holds all three, or -1
 };
@@ -63,8 +65,10 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
 
   // Pass 1: the voxels on the surface, in key order; each becomes a vertex.
   constexpr int kPad = 2, kN = BrickGrid::kEdge + 2 * kPad;
-  using Block = std::array<float, static_cast<std::size_t>(kN* kN* kN)>;
-  const auto at = [](const Block& b, int i, int j, int k) { return b[static_cast<std::size_t>(((k + kPad) * kN + j + kPad) * kN + i + kPad)]; };
+  using Block = std::array<float, static_cast<std::size_t>(kN * kN * kN)>;
+  const auto at = [](const Block& b, int i, int j, int k) {
+    return b[static_cast<std::size_t>(((k + kPad) * kN + j + kPad) * kN + i + kPad)];
+  };
   const auto on_surface = [&](const Block& b, int i, int j, int k) {
     if (at(b, i, j, k) < iso) return false;
     for (int n = 0; n < 27; ++n) {
@@ -149,7 +153,8 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
                 for (int c = 0; c < 8; ++c) low_side |= static_cast<unsigned>(corner(c)[static_cast<std::size_t>(axis)] == 0) << c;
                 (t.above != 0 ? below : above) = beyond & low_side;
                 // A full square has two ways to be split: keep the one along its first corner.
-                const std::array<unsigned, 3> squares{1U << 0 | 1U << 2 | 1U << 4 | 1U << 6, 1U << 0 | 1U << 1 | 1U << 4 | 1U << 5, 1U << 0 | 1U << 1 | 1U << 2 | 1U << 3};
+                const std::array<unsigned, 3> squares{1U << 0 | 1U << 2 | 1U << 4 | 1U << 6, 1U << 0 | 1U << 1 | 1U << 4 | 1U << 5,
+                                                      1U << 0 | 1U << 1 | 1U << 2 | 1U << 3};
                 const unsigned square = squares[static_cast<std::size_t>(axis)];
                 const bool full = (mask & square) == square;
                 if (full && t.c[0] != 0) continue;

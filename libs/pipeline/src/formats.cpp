@@ -19,12 +19,14 @@ struct Suffixes {
   std::string_view writable;
 };
 constexpr std::array<Suffixes, 5> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
-                                              {DataKind::labels, ".nrrd .nii .nii.gz .mha .vti"},
-                                              {DataKind::grid, ".vdb"},
-                                              {DataKind::surface, ".ply .stl .obj .vtp"},
-                                              {DataKind::picture, ".png"}}};
+                                             {DataKind::labels, ".nrrd .nii .nii.gz .mha .vti"},
+                                             {DataKind::grid, ".vdb"},
+                                             {DataKind::surface, ".ply .stl .obj .vtp"},
+                                             {DataKind::picture, ".png"}}};
 
-bool accepts(std::span<const DataKind> kinds, DataKind kind) { return std::find(kinds.begin(), kinds.end(), kind) != kinds.end(); }
+bool accepts(std::span<const DataKind> kinds, DataKind kind) {
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
 
 }  // namespace
 
@@ -42,7 +44,8 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   }
   require_readable(path);
   const auto wrong = [&](DataKind found) {
-    return Error(ExitCode::usage, "'" + path.string() + "' is a " + std::string(kind_name(found)) + " by its name; " + kinds_text(accepted) + " is wanted");
+    return Error(ExitCode::usage,
+                 "'" + path.string() + "' is a " + std::string(kind_name(found)) + " by its name; " + kinds_text(accepted) + " is wanted");
   };
   if (path.extension() == ".vdb") {
     if (!accepts(accepted, DataKind::grid)) throw wrong(DataKind::grid);
@@ -99,12 +102,21 @@ void save_data(const Data& data, const fs::path& path, const Context& context) {
         save_image(std::get<Image>(data), path);
       }
       return;
-    case DataKind::labels: save_labels(std::get<Labels>(data), path); return;
-    case DataKind::grid: save_grid(std::get<SparseGrid>(data), path); return;
-    case DataKind::surface: save_surface(*std::get<Surface>(data), path); return;
-    case DataKind::picture: save_picture(std::get<Picture>(data), path); return;
+    case DataKind::labels:
+      save_labels(std::get<Labels>(data), path);
+      return;
+    case DataKind::grid:
+      save_grid(std::get<SparseGrid>(data), path);
+      return;
+    case DataKind::surface:
+      save_surface(*std::get<Surface>(data), path);
+      return;
+    case DataKind::picture:
+      save_picture(std::get<Picture>(data), path);
+      return;
     case DataKind::none:
-    case DataKind::source: break;
+    case DataKind::source:
+      break;
   }
   throw Error(ExitCode::unspecified, "a stage returned nothing for '" + path.string() + "'");
 }

@@ -72,7 +72,8 @@ std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
 Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
   const json root = parse_json(text);
   allow_keys(root, "", {"osteotome", "name", "description", "variables", "stages"});
-  if (!root.contains("osteotome") || root["osteotome"] != 1) fail("", "the key \"osteotome\": 1 is missing", "it says which format the file has");
+  if (!root.contains("osteotome") || root["osteotome"] != 1)
+    fail("", "the key \"osteotome\": 1 is missing", "it says which format the file has");
   if (!root.contains("stages") || !root["stages"].is_array()) fail("", "the list \"stages\" is missing");
 
   std::map<std::string, std::string> variables;

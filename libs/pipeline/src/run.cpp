@@ -26,12 +26,15 @@ std::vector<std::string> names_of(const std::vector<Port>& ports) {
   return names;
 }
 
-[[noreturn]] void unknown(const std::string& where, const std::string& what, const std::string& name, const std::vector<std::string>& known) {
+[[noreturn]] void unknown(const std::string& where, const std::string& what, const std::string& name,
+                          const std::vector<std::string>& known) {
   const std::string near = nearest_name(name, known);
   std::string list;
   for (const auto& k : known) list += (list.empty() ? "" : ", ") + k;
   throw Error(ExitCode::usage, where + ": there is no " + what + " '" + name + "'",
-              !near.empty() ? "did you mean '" + near + "'?" : known.empty() ? "it has none" : "it has " + list);
+              !near.empty()   ? "did you mean '" + near + "'?"
+              : known.empty() ? "it has none"
+                              : "it has " + list);
 }
 
 void set_params(Stage& stage, const PipelineNode& node) {
@@ -101,7 +104,8 @@ class Runner {
   void refuse_to_overwrite() const {
     for (const auto& node : pipeline_.nodes) {
       for (const auto& [port, path] : node.outputs) {
-        if (fs::exists(path)) throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
+        if (fs::exists(path))
+          throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
       }
     }
   }
@@ -207,9 +211,21 @@ class Runner {
   }
 
   void save_output(std::size_t n, const std::string& port, const Data& value, const fs::path& path, const Context& context) {
-    NodeResult& result = results_[n];
+    const bool is_new = !fs::exists(path);
     if (fs::is_directory(path) && (options_.overwrite || options_.reuse)) fs::remove_all(path);
     save_data(value, path, context);
+    try {
+      save_provenance(n, port, path, context);
+    } catch (...) {
+      // An output is not complete without its record.
+      std::error_code ignored;
+      if (is_new) fs::remove_all(path, ignored);
+      throw;
+    }
+  }
+
+  void save_provenance(std::size_t n, const std::string& port, const fs::path& path, const Context& context) {
+    NodeResult& result = results_[n];
     result.output_hashes[port] = hash_path(path);
     ordered_json p;
     p["osteotome"] = std::string(program_version());
@@ -236,7 +252,8 @@ class Runner {
     for (std::size_t m = 0; m <= done; ++m) {
       bool used = false;
       for (std::size_t n = done + 1; n < stages_.size() && !used; ++n) {
-        for (const auto& [port, input] : pipeline_.nodes[n].inputs) used = used || (is_needed(n) && !input.node.empty() && index_.at(input.node) == m);
+        for (const auto& [port, input] : pipeline_.nodes[n].inputs)
+          used = used || (is_needed(n) && !input.node.empty() && index_.at(input.node) == m);
       }
       if (!used) values_[m].clear();
     }
@@ -283,12 +300,13 @@ void validate(Pipeline& pipeline, const Registry& registry) {
       const Port* const out = input.port.empty() ? &from.outputs.front() : find_port(from.outputs, input.port);
       if (out == nullptr) unknown(where + " input '" + name + "'", "output of '" + input.node + "'", input.port, names_of(from.outputs));
       if (std::find(port->kinds.begin(), port->kinds.end(), out->kinds.front()) == port->kinds.end()) {
-        throw Error(ExitCode::usage, where + " takes " + kinds_text(port->kinds) + " as '" + name + "', but '" + input.node + "." + out->name + "' is " +
-                                         std::string(kind_name(out->kinds.front())));
+        throw Error(ExitCode::usage, where + " takes " + kinds_text(port->kinds) + " as '" + name + "', but '" + input.node + "." +
+                                         out->name + "' is " + std::string(kind_name(out->kinds.front())));
       }
     }
     for (const Port& port : info.inputs) {
-      if (!port.optional && !node.inputs.contains(port.name)) throw Error(ExitCode::usage, where + ": the input '" + port.name + "' is missing");
+      if (!port.optional && !node.inputs.contains(port.name))
+        throw Error(ExitCode::usage, where + ": the input '" + port.name + "' is missing");
     }
     for (const auto& [name, path] : node.outputs) {
       const Port* const port = find_port(info.outputs, name);
@@ -305,7 +323,8 @@ void validate(Pipeline& pipeline, const Registry& registry) {
     const std::size_t before = ordered.size();
     for (const PipelineNode& node : pipeline.nodes) {
       if (placed.contains(node.id)) continue;
-      const bool ready = std::all_of(node.inputs.begin(), node.inputs.end(), [&](const auto& in) { return in.second.node.empty() || placed.contains(in.second.node); });
+      const bool ready = std::all_of(node.inputs.begin(), node.inputs.end(),
+                                     [&](const auto& in) { return in.second.node.empty() || placed.contains(in.second.node); });
       if (!ready) continue;
       placed.insert(node.id);
       ordered.push_back(node);
@@ -325,6 +344,8 @@ fs::path provenance_path(const fs::path& output) {
   return path += ".prov.json";
 }
 
-std::string_view program_version() { return OSTEO_VERSION; }
+std::string_view program_version() {
+  return OSTEO_VERSION;
+}
 
 }  // namespace osteo

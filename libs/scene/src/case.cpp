@@ -12,7 +12,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json triple(Vec3 v) { return {v.x, v.y, v.z}; }
+ordered_json triple(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
 
 }  // namespace
 
@@ -28,16 +30,21 @@ void write_manifest(const fs::path& folder, const std::string& pipeline_name, co
   for (const NodeResult& r : results) {
     m["steps"].push_back({{"id", r.id}, {"stage", r.stage}, {"params", r.params}, {"key", r.key}, {"report", report_to_json(r.report)}});
     for (const auto& [port, path] : r.outputs) {
-      if (path.parent_path().lexically_normal() != folder.lexically_normal() && fs::absolute(path).parent_path() != fs::absolute(folder)) continue;
+      if (path.parent_path().lexically_normal() != folder.lexically_normal() && fs::absolute(path).parent_path() != fs::absolute(folder))
+        continue;
       m["files"][port] = {{"file", path.filename().string()}, {"hash", r.output_hashes.at(port)}};
     }
   }
   if (!m["files"].contains("bone")) {
-    throw Error(ExitCode::usage, "the pipeline writes no \"bone\" into the case folder", "a case needs a stage with the output bone, as in pipelines/temporal-bone.json");
+    throw Error(ExitCode::usage, "the pipeline writes no \"bone\" into the case folder",
+                "a case needs a stage with the output bone, as in pipelines/temporal-bone.json");
   }
   const SparseGrid bone = load_grid(folder / m["files"]["bone"]["file"].get<std::string>());
-  m["frame"] = {{"dims", bone.frame.dims}, {"spacing_mm", triple(bone.frame.spacing_mm)}, {"origin_mm", triple(bone.frame.origin_mm)},
-                {"direction", {triple(bone.frame.direction.column[0]), triple(bone.frame.direction.column[1]), triple(bone.frame.direction.column[2])}},
+  m["frame"] = {{"dims", bone.frame.dims},
+                {"spacing_mm", triple(bone.frame.spacing_mm)},
+                {"origin_mm", triple(bone.frame.origin_mm)},
+                {"direction",
+                 {triple(bone.frame.direction.column[0]), triple(bone.frame.direction.column[1]), triple(bone.frame.direction.column[2])}},
                 {"axes", orientation_code(bone.frame)}};
   m["bone_memory_mb"] = static_cast<double>(bone.memory_bytes) / 1e6;
   write_file(folder / "manifest.json", m.dump(2) + "\n");
@@ -47,7 +54,8 @@ Case load_case(const fs::path& folder) {
   require_readable(folder);
   const fs::path manifest = folder / "manifest.json";
   if (!fs::is_directory(folder) || !fs::exists(manifest)) {
-    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json", "make one with: osteo prepare CT -o " + folder.string());
+    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
+                "make one with: osteo prepare CT -o " + folder.string());
   }
   Case result;
   result.folder = folder;
@@ -61,7 +69,8 @@ Case load_case(const fs::path& folder) {
       const fs::path path = folder / name;
       require_readable(path);
       if (hash_path(path) != f.at("hash").get<std::string>()) {
-        throw Error(ExitCode::corrupt, "'" + path.string() + "' is not the file that the manifest describes", "it was changed or damaged: run 'osteo prepare' again");
+        throw Error(ExitCode::corrupt, "'" + path.string() + "' is not the file that the manifest describes",
+                    "it was changed or damaged: run 'osteo prepare' again");
       }
       result.files[role] = path;
     }

@@ -12,8 +12,13 @@
 namespace osteo {
 
 Rehearsal::Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context)
-    : bone_(std::move(bone)), device_(std::move(device)), options_(options), model_(options.contact),
-      servo_(bone_, model_, *device_, stream_, options.rate_hz), tick_buffer_(1024), change_buffer_(1 << 20) {
+    : bone_(std::move(bone)),
+      device_(std::move(device)),
+      options_(options),
+      model_(options.contact),
+      servo_(bone_, model_, *device_, stream_, options.rate_hz),
+      tick_buffer_(1024),
+      change_buffer_(1 << 20) {
   if (!options_.session_file.empty()) {
     SessionHeader header;
     header.program_version = program_version();
@@ -35,8 +40,12 @@ Rehearsal::~Rehearsal() {
   if (follower_.joinable()) follower_.join();
 }
 
-double Rehearsal::removed_mm3() const { return removed_mm3_; }
-bool Rehearsal::running() const { return loop_ && loop_->running(); }
+double Rehearsal::removed_mm3() const {
+  return removed_mm3_;
+}
+bool Rehearsal::running() const {
+  return loop_ && loop_->running();
+}
 
 std::size_t Rehearsal::drain_surface() {
   if (surface_reader_ == nullptr) return 0;
@@ -125,7 +134,8 @@ ReplayResult replay(const Session& session, BrickGrid& bone, const Context& cont
   const auto begin = std::chrono::steady_clock::now();
   ReplayResult result;
   if (bone.hash() != session.header.bone_hash) {
-    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's", "give the case it was recorded on, unchanged");
+    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
+                "give the case it was recorded on, unchanged");
   }
   std::vector<DeviceSample> samples;
   samples.reserve(session.ticks.size());
@@ -141,22 +151,25 @@ ReplayResult replay(const Session& session, BrickGrid& bone, const Context& cont
     if (result.difference.empty()) result.difference = what;
   };
   for (const TickRecord& recorded : session.ticks) {
-    if (recorded.tick % 256 == 0) context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(session.ticks.size()), "replay");
+    if (recorded.tick % 256 == 0)
+      context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(session.ticks.size()), "replay");
     servo.step(0);
     TickRecord now;
     reader.ticks.pop({&now, 1});
     while (reader.changes.pop(changes) > 0) {
     }
     // Bytes, not numbers: the same bits or not.
-    const bool same = std::memcmp(&now.force_n, &recorded.force_n, sizeof now.force_n) == 0 && std::memcmp(&now.depth_mm, &recorded.depth_mm, sizeof now.depth_mm) == 0 &&
-                      std::memcmp(&now.removed_mm3, &recorded.removed_mm3, sizeof now.removed_mm3) == 0 && now.voxels_changed == recorded.voxels_changed &&
-                      now.immersed_samples == recorded.immersed_samples;
+    const bool same = std::memcmp(&now.force_n, &recorded.force_n, sizeof now.force_n) == 0 &&
+                      std::memcmp(&now.depth_mm, &recorded.depth_mm, sizeof now.depth_mm) == 0 &&
+                      std::memcmp(&now.removed_mm3, &recorded.removed_mm3, sizeof now.removed_mm3) == 0 &&
+                      now.voxels_changed == recorded.voxels_changed && now.immersed_samples == recorded.immersed_samples;
     if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
     result.removed_mm3 += static_cast<double>(now.removed_mm3);
   }
   result.ticks = session.ticks.size();
   for (const VoxelChange& c : session.changes) {
-    if (c.voxel / BrickGrid::kVoxels >= from_changes.brick_count()) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    if (c.voxel / BrickGrid::kVoxels >= from_changes.brick_count())
+      throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
     from_changes.set(c.voxel, c.density);
   }
   result.bone_hash = bone.hash();
@@ -188,9 +201,11 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
   const Vec3 out{left ? 1.0 : -1.0, 0, 0};
   const auto density_at = [&](Vec3 p) {
     const Vec3 i = bone.frame().index_from_world(p);
-    return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5)));
+    return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
+                   static_cast<int>(std::floor(i.z + 0.5)));
   };
-  // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a head holder are narrower and wider); try rays around the centre until one meets bone.
+  // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a head holder are
+  // narrower and wider); try rays around the centre until one meets bone.
   std::optional<Vec3> entry;
   const auto& f = bone.frame();
   const double longest = length({f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z});
@@ -209,7 +224,9 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
       if (bone_end >= 0) entry = from + out * bone_end;
     }
   }
-  if (!entry) throw Error(ExitCode::failed, "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side", "write a script of strokes for this case");
+  if (!entry)
+    throw Error(ExitCode::failed, "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side",
+                "write a script of strokes for this case");
 
   const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
   Script script;
@@ -225,7 +242,8 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
     const double rim = std::min(7.0, 3 + seconds / 15), sway = std::abs(std::fmod(0.25 * (t - first), 2.0) - 1);
     const double circle = rim * (1 - sway), angle = 2 * std::numbers::pi * 1.2 * (t - first);
     const double depth = 3 + std::min(9.0, 0.12 * seconds + 1) * share;
-    script.waypoints.push_back({t, *entry + out * (radius - depth) + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+    script.waypoints.push_back(
+        {t, *entry + out * (radius - depth) + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
   }
   script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});
   script.waypoints.push_back({seconds, *entry + out * (radius + 8), false});

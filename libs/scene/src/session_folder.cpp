@@ -10,7 +10,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-std::string relative_to(const fs::path& target, const fs::path& folder) { return fs::proximate(fs::absolute(target), fs::absolute(folder)).string(); }
+std::string relative_to(const fs::path& target, const fs::path& folder) {
+  return fs::proximate(fs::absolute(target), fs::absolute(folder)).string();
+}
 
 ordered_json quantiles(const Histogram& h) {
   return {{"p50", h.quantile_us(0.5)}, {"p99", h.quantile_us(0.99)}, {"p99.9", h.quantile_us(0.999)}, {"max", h.max_us()}};
@@ -30,7 +32,9 @@ SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case
   }
   std::error_code ec;
   fs::create_directories(s.folder, ec);
-  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + s.folder.string() + "': " + ec.message(), "choose a folder that you may write to");
+  if (ec)
+    throw Error(ExitCode::cannot_write, "cannot make the folder '" + s.folder.string() + "': " + ec.message(),
+                "choose a folder that you may write to");
   ordered_json j{{"osteotome_session_folder", 1}, {"case", relative_to(case_folder, s.folder)}};
   if (!resumed_from.empty()) j["resumed_from"] = relative_to(resumed_from, s.folder);
   write_file(s.folder / "session.json", j.dump(2) + "\n");
@@ -61,10 +65,12 @@ BrickGrid bone_at_end(const SessionFolder& session) {
   BrickGrid bone = bone_at_begin(session);
   const Session recorded = read_session(session.stream());
   if (bone.hash() != recorded.header.bone_hash) {
-    throw Error(ExitCode::corrupt, "the session '" + session.folder.string() + "' was recorded on another bone than its case holds now", "give the case it was recorded on, unchanged");
+    throw Error(ExitCode::corrupt, "the session '" + session.folder.string() + "' was recorded on another bone than its case holds now",
+                "give the case it was recorded on, unchanged");
   }
   for (const VoxelChange& c : recorded.changes) {
-    if (c.voxel / BrickGrid::kVoxels >= bone.brick_count()) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    if (c.voxel / BrickGrid::kVoxels >= bone.brick_count())
+      throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
     bone.set(c.voxel, c.density);
   }
   if (recorded.end && bone.hash() != recorded.end->bone_hash) {

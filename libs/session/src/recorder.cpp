@@ -7,7 +7,9 @@ namespace osteo {
 Recorder::Recorder(StreamReader& reader, const std::filesystem::path& path, const SessionHeader& header)
     : reader_(reader), writer_(path, header), ticks_buffer_(256), changes_buffer_(1 << 20) {}
 
-Recorder::~Recorder() { stop(); }
+Recorder::~Recorder() {
+  stop();
+}
 
 void Recorder::start() {
   thread_ = std::thread([this] {

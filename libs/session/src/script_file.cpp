@@ -11,7 +11,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-Vec3 point_of(const ordered_json& j) { return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()}; }
+Vec3 point_of(const ordered_json& j) {
+  return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+}
 
 }  // namespace
 
@@ -30,7 +32,8 @@ Script load_script(const fs::path& path) {
     for (const auto& w : j.at("waypoints")) {
       where = "waypoint " + std::to_string(script.waypoints.size() + 1);
       const Script::Waypoint point{w.at("t_s"), point_of(w.at("at_mm")), w.value("drill", true)};
-      if (!script.waypoints.empty() && !(point.t_s > script.waypoints.back().t_s)) throw Error(ExitCode::usage, name + ": " + where + ": times must rise");
+      if (!script.waypoints.empty() && !(point.t_s > script.waypoints.back().t_s))
+        throw Error(ExitCode::usage, name + ": " + where + ": times must rise");
       script.waypoints.push_back(point);
     }
   } catch (const nlohmann::json::exception& e) {
@@ -47,7 +50,8 @@ std::string script_json(const Script& script) {
   j["burr"] = {{"kind", burr.kind == BurrKind::cutting ? "cutting" : "diamond"}, {"diameter_mm", burr.diameter_mm}};
   j["axis"] = {script.axis.x, script.axis.y, script.axis.z};
   j["waypoints"] = ordered_json::array();
-  for (const auto& w : script.waypoints) j["waypoints"].push_back({{"t_s", w.t_s}, {"at_mm", {w.at_mm.x, w.at_mm.y, w.at_mm.z}}, {"drill", w.drill_on}});
+  for (const auto& w : script.waypoints)
+    j["waypoints"].push_back({{"t_s", w.t_s}, {"at_mm", {w.at_mm.x, w.at_mm.y, w.at_mm.z}}, {"drill", w.drill_on}});
   return j.dump(1) + "\n";
 }
 

@@ -34,7 +34,9 @@ std::uint32_t checksum(std::uint32_t type, std::span<const std::byte> payload) {
   return static_cast<std::uint32_t>(crc);
 }
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text.data(), text.size())); }
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
 
 template <class T>
 void append_records(std::vector<T>& out, std::span<const std::byte> payload) {
@@ -48,7 +50,8 @@ void append_records(std::vector<T>& out, std::span<const std::byte> payload) {
 SessionWriter::SessionWriter(const fs::path& path, const SessionHeader& h) : path_(path) {
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (fd_ < 0) {
-    throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(errno), errno == EEXIST ? "give another name" : "choose a folder that you may write to");
+    throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(errno),
+                errno == EEXIST ? "give another name" : "choose a folder that you may write to");
   }
   ordered_json j;
   j["osteotome_session"] = 1;
@@ -57,8 +60,10 @@ SessionWriter::SessionWriter(const fs::path& path, const SessionHeader& h) : pat
   j["rate_hz"] = h.rate_hz;
   j["burr_library"] = h.burr_library;
   j["tick_bytes"] = sizeof(TickRecord);
-  j["contact"] = {{"stiffness_n_per_mm", h.contact.stiffness_n_per_mm}, {"soft_stiffness_n_per_mm", h.contact.soft_stiffness_n_per_mm},
-                  {"soft_depth_mm", h.contact.soft_depth_mm}, {"max_force_n", h.contact.max_force_n}};
+  j["contact"] = {{"stiffness_n_per_mm", h.contact.stiffness_n_per_mm},
+                  {"soft_stiffness_n_per_mm", h.contact.soft_stiffness_n_per_mm},
+                  {"soft_depth_mm", h.contact.soft_depth_mm},
+                  {"max_force_n", h.contact.max_force_n}};
   frame(kHeader, bytes_of(j.dump()));
 }
 
@@ -75,7 +80,9 @@ void SessionWriter::frame(std::uint32_t type, std::span<const std::byte> payload
   while (done < all.size()) {
     const ssize_t n = ::write(fd_, all.data() + done, all.size() - done);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw Error(ExitCode::cannot_write, "cannot write '" + path_.string() + "': " + std::strerror(errno), "what was recorded before can be replayed");
+    if (n < 0)
+      throw Error(ExitCode::cannot_write, "cannot write '" + path_.string() + "': " + std::strerror(errno),
+                  "what was recorded before can be replayed");
     done += static_cast<std::size_t>(n);
   }
   bytes_ += all.size();
@@ -96,7 +103,9 @@ void SessionWriter::append(std::span<const TickRecord> ticks, std::span<const Vo
   frame(kChanges, std::as_bytes(std::span(coalesced_)));
 }
 
-void SessionWriter::sync() { ::fdatasync(fd_); }
+void SessionWriter::sync() {
+  ::fdatasync(fd_);
+}
 
 void SessionWriter::finish(const SessionEnd& e) {
   ordered_json j;
@@ -130,7 +139,8 @@ Session read_session(const fs::path& path) {
     try {
       if (first) {
         const auto j = ordered_json::parse(text);
-        if (head.type != kHeader || j.at("osteotome_session") != 1) throw Error(ExitCode::corrupt, name + " is not a session of this program");
+        if (head.type != kHeader || j.at("osteotome_session") != 1)
+          throw Error(ExitCode::corrupt, name + " is not a session of this program");
         session.header.program_version = j.at("program");
         session.header.bone_hash = j.at("bone_hash");
         session.header.rate_hz = j.at("rate_hz");
@@ -138,7 +148,8 @@ Session read_session(const fs::path& path) {
         const auto& c = j.at("contact");
         session.header.contact = {c.at("stiffness_n_per_mm"), c.at("soft_stiffness_n_per_mm"), c.at("soft_depth_mm"), c.at("max_force_n")};
         if (j.at("tick_bytes") != sizeof(TickRecord) || session.header.burr_library != kBurrLibraryVersion) {
-          throw Error(ExitCode::corrupt, name + " was recorded by another version (" + session.header.program_version + ")", "replay it with that version");
+          throw Error(ExitCode::corrupt, name + " was recorded by another version (" + session.header.program_version + ")",
+                      "replay it with that version");
         }
         first = false;
       } else if (head.type == kTicks) {

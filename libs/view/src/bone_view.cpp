@@ -35,7 +35,8 @@ void BoneView::show(const LiveSurface& surface) {
   chunk_of_brick_.resize(surface.bone().brick_count());
   for (std::uint32_t b = 0; b < chunk_of_brick_.size(); ++b) {
     const Ijk o = surface.bone().brick_coordinate(b);
-    const auto [it, fresh] = index.try_emplace({o.k / kChunkBricks, o.j / kChunkBricks, o.i / kChunkBricks}, static_cast<std::uint32_t>(chunks_.size()));
+    const auto [it, fresh] =
+        index.try_emplace({o.k / kChunkBricks, o.j / kChunkBricks, o.i / kChunkBricks}, static_cast<std::uint32_t>(chunks_.size()));
     if (fresh) chunks_.emplace_back();
     chunks_[it->second].bricks.push_back(b);
     chunk_of_brick_[b] = it->second;
@@ -78,8 +79,10 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   for (const std::uint32_t b : chunk.bricks) {
     const SurfacePatch& patch = surface.patch(b);
     for (const auto& v : patch.vertices) {
-      const Vec3 w = frame.world_from_index({static_cast<double>(v.index[0]), static_cast<double>(v.index[1]), static_cast<double>(v.index[2])});
-      const Vec3 d = frame.direction * Vec3{static_cast<double>(v.normal[0]), static_cast<double>(v.normal[1]), static_cast<double>(v.normal[2])};
+      const Vec3 w =
+          frame.world_from_index({static_cast<double>(v.index[0]), static_cast<double>(v.index[1]), static_cast<double>(v.index[2])});
+      const Vec3 d =
+          frame.direction * Vec3{static_cast<double>(v.normal[0]), static_cast<double>(v.normal[1]), static_cast<double>(v.normal[2])};
       for (std::size_t a = 0; a < 3; ++a) {
         *p++ = static_cast<float>(w[a]);
         *n++ = static_cast<float>(d[a]);

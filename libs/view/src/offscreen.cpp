@@ -25,18 +25,22 @@ OffscreenWindow::OffscreenWindow(int width, int height) : impl_(std::make_unique
   const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(eglGetProcAddress("eglGetPlatformDisplayEXT"));
   if (get_display != nullptr) impl_->display = get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
   if (impl_->display == EGL_NO_DISPLAY) impl_->display = eglGetDisplay(EGL_DEFAULT_DISPLAY);
-  if (impl_->display == EGL_NO_DISPLAY || eglInitialize(impl_->display, nullptr, nullptr) == EGL_FALSE) throw fail("there is no EGL display");
+  if (impl_->display == EGL_NO_DISPLAY || eglInitialize(impl_->display, nullptr, nullptr) == EGL_FALSE)
+    throw fail("there is no EGL display");
   eglBindAPI(EGL_OPENGL_API);
-  const EGLint config_wish[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8, EGL_DEPTH_SIZE, 24, EGL_NONE};
+  const EGLint config_wish[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8, EGL_DEPTH_SIZE, 24,
+                                EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
   eglChooseConfig(impl_->display, config_wish, &config, 1, &count);
   if (count == 0) throw fail("EGL has no OpenGL configuration");
-  const EGLint context_wish[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 2, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                 EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  const EGLint context_wish[] = {
+      EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 2, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
   impl_->context = eglCreateContext(impl_->display, config, EGL_NO_CONTEXT, context_wish);
   if (impl_->context == EGL_NO_CONTEXT) throw fail("OpenGL 3.2 is not available");
-  if (eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context) == EGL_FALSE) throw fail("the OpenGL context cannot be used");
+  if (eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context) == EGL_FALSE)
+    throw fail("the OpenGL context cannot be used");
 
   impl_->window = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
   impl_->window->SetOwnContext(0);
@@ -64,7 +68,9 @@ OffscreenWindow::~OffscreenWindow() {
   }
 }
 
-vtkGenericOpenGLRenderWindow* OffscreenWindow::window() { return impl_->window; }
+vtkGenericOpenGLRenderWindow* OffscreenWindow::window() {
+  return impl_->window;
+}
 
 Picture OffscreenWindow::render() {
   const QuietVtk quiet;
@@ -79,7 +85,8 @@ Picture grab(vtkGenericOpenGLRenderWindow* window) {
   const std::size_t row = static_cast<std::size_t>(picture.width) * 3;
   picture.rgb.resize(row * static_cast<std::size_t>(picture.height));
   for (int y = 0; y < picture.height; ++y) {
-    std::copy_n(pixels->GetPointer(0) + static_cast<std::size_t>(picture.height - 1 - y) * row, row, picture.rgb.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(y) * row));
+    std::copy_n(pixels->GetPointer(0) + static_cast<std::size_t>(picture.height - 1 - y) * row, row,
+                picture.rgb.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(y) * row));
   }
   return picture;
 }

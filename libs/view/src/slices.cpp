@@ -17,15 +17,19 @@ struct Axes {
 };
 Axes axes_of(Plane plane) {
   switch (plane) {
-    case Plane::axial: return {{1, 0, 0}, {0, 1, 0}};
-    case Plane::coronal: return {{1, 0, 0}, {0, 0, -1}};
-    case Plane::sagittal: return {{0, 1, 0}, {0, 0, -1}};
+    case Plane::axial:
+      return {{1, 0, 0}, {0, 1, 0}};
+    case Plane::coronal:
+      return {{1, 0, 0}, {0, 0, -1}};
+    case Plane::sagittal:
+      return {{0, 1, 0}, {0, 0, -1}};
   }
   return {};
 }
 
 // Distinct tints for the first labels; later ones repeat.
-constexpr std::array<std::array<double, 3>, 8> kTints{{{235, 120, 60}, {90, 200, 120}, {90, 150, 255}, {240, 220, 80}, {220, 90, 200}, {80, 220, 220}, {255, 150, 150}, {180, 180, 90}}};
+constexpr std::array<std::array<double, 3>, 8> kTints{
+    {{235, 120, 60}, {90, 200, 120}, {90, 150, 255}, {240, 220, 80}, {220, 90, 200}, {80, 220, 220}, {255, 150, 150}, {180, 180, 90}}};
 
 }  // namespace
 
@@ -42,7 +46,9 @@ std::array<double, 2> SliceView::pixel(Vec3 world_mm) const {
   return {dot(d, a.right) / mm_per_pixel + width / 2.0 - 0.5, dot(d, a.down) / mm_per_pixel + height / 2.0 - 0.5};
 }
 
-double grey_of_hu(double hu) { return std::clamp((hu + 200) / 1700 * 255, 0.0, 255.0); }
+double grey_of_hu(double hu) {
+  return std::clamp((hu + 200) / 1700 * 255, 0.0, 255.0);
+}
 
 Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label) {
   Picture picture{view.width, view.height, {}};
@@ -89,7 +95,8 @@ void write_text(Picture& onto, std::string_view text, int x, int y, int size, st
       const int px = x + i - extent[0], py = y - (j - extent[2]);
       if (p[3] == 0 || px < 0 || py < 0 || px >= onto.width || py >= onto.height) continue;
       const double alpha = p[3] / 255.0;
-      std::uint8_t* const out = onto.rgb.data() + (static_cast<std::size_t>(py) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(px)) * 3;
+      std::uint8_t* const out =
+          onto.rgb.data() + (static_cast<std::size_t>(py) * static_cast<std::size_t>(onto.width) + static_cast<std::size_t>(px)) * 3;
       for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<std::uint8_t>(std::lround(out[c] * (1 - alpha) + rgb[c] * alpha));
     }
   }

@@ -80,7 +80,9 @@ std::pair<Vec3, Vec3> bounds_of(const Data& data) {
     }
   };
   const auto add_frame = [&](const Frame& f) {
-    for (int c = 0; c < 8; ++c) add(f.world_from_index({(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
+    for (int c = 0; c < 8; ++c)
+      add(f.world_from_index(
+          {(c & 1) != 0 ? f.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? f.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? f.dims[2] - 1.0 : 0.0}));
   };
   if (const auto* image = std::get_if<Image>(&data)) add_frame(image->frame);
   if (const auto* labels = std::get_if<Labels>(&data)) add_frame(labels->frame);
@@ -129,13 +131,20 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
 
 Vec3 eye_direction(ViewFrom from) {
   switch (from) {
-    case ViewFrom::left_front: return normalized({0.75, -0.62, 0.22});
-    case ViewFrom::left: return {1, 0, 0};
-    case ViewFrom::right: return {-1, 0, 0};
-    case ViewFrom::front: return {0, -1, 0};
-    case ViewFrom::back: return {0, 1, 0};
-    case ViewFrom::above: return {0, 0, 1};
-    case ViewFrom::below: return {0, 0, -1};
+    case ViewFrom::left_front:
+      return normalized({0.75, -0.62, 0.22});
+    case ViewFrom::left:
+      return {1, 0, 0};
+    case ViewFrom::right:
+      return {-1, 0, 0};
+    case ViewFrom::front:
+      return {0, -1, 0};
+    case ViewFrom::back:
+      return {0, 1, 0};
+    case ViewFrom::above:
+      return {0, 0, 1};
+    case ViewFrom::below:
+      return {0, 0, -1};
   }
   return {1, 0, 0};
 }
@@ -197,7 +206,8 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   } else {
     write_text(picture, "no bone at this threshold", p.width - sw + 20, p.height - sh / 2, 18);
   }
-  write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]), p.width - sw + 10, p.height - sh + 24, 15, {150, 165, 180});
+  write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]), p.width - sw + 10,
+             p.height - sh + 24, 15, {150, 165, 180});
   if (!p.title.empty()) write_text(picture, p.title, p.width - sw + 10, p.height - 12, 16);
   context.progress(1.0);
   return picture;

@@ -37,4 +37,6 @@ unsigned long vtkOsteoDataObject::GetActualMemorySize() {
   return kib;
 }
 
-vtkOsteoDataObject* vtkOsteoDataObject::GetData(vtkInformation* info) { return info != nullptr ? vtkOsteoDataObject::SafeDownCast(info->Get(vtkDataObject::DATA_OBJECT())) : nullptr; }
+vtkOsteoDataObject* vtkOsteoDataObject::GetData(vtkInformation* info) {
+  return info != nullptr ? vtkOsteoDataObject::SafeDownCast(info->Get(vtkDataObject::DATA_OBJECT())) : nullptr;
+}

@@ -24,7 +24,9 @@ vtkStandardNewMacro(vtkOsteoStage);
 
 namespace {
 
-bool is_image(DataKind kind) { return kind == DataKind::image || kind == DataKind::labels; }
+bool is_image(DataKind kind) {
+  return kind == DataKind::image || kind == DataKind::labels;
+}
 
 const char* class_of(DataKind kind) {
   if (is_image(kind)) return "vtkImageData";
@@ -197,9 +199,12 @@ bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
     vtkDataObject* const present = info->Get(vtkDataObject::DATA_OBJECT());
     if (present != nullptr && present->IsA(wanted.c_str())) continue;
     vtkSmartPointer<vtkDataObject> fresh;
-    if (wanted == "vtkImageData") fresh = vtkSmartPointer<vtkImageData>::New();
-    else if (wanted == "vtkPolyData") fresh = vtkSmartPointer<vtkPolyData>::New();
-    else fresh = vtkSmartPointer<vtkOsteoDataObject>::New();
+    if (wanted == "vtkImageData")
+      fresh = vtkSmartPointer<vtkImageData>::New();
+    else if (wanted == "vtkPolyData")
+      fresh = vtkSmartPointer<vtkPolyData>::New();
+    else
+      fresh = vtkSmartPointer<vtkOsteoDataObject>::New();
     info->Set(vtkDataObject::DATA_OBJECT(), fresh);
   }
   return true;
@@ -286,7 +291,8 @@ bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector*
       int promised[6], extent[6];
       info->Get(Pipeline::WHOLE_EXTENT(), promised);
       image->GetExtent(extent);
-      if (extent[1] - extent[0] != promised[1] - promised[0] || extent[3] - extent[2] != promised[3] - promised[2] || extent[5] - extent[4] != promised[5] - promised[4]) {
+      if (extent[1] - extent[0] != promised[1] - promised[0] || extent[3] - extent[2] != promised[3] - promised[2] ||
+          extent[5] - extent[4] != promised[5] - promised[4]) {
         this->Fail(nullptr, "the output's extent differs from the one announced");
         return false;
       }

@@ -43,7 +43,8 @@ constexpr double kDisplayForceN = 4;  // full length of the force bar
 
 class RehearsalWindow {
  public:
-  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions) : actions_(actions), tool_(options.tool) {
+  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
+      : actions_(actions), tool_(options.tool) {
     if (hu != nullptr) hu_.emplace(*hu);
     open(options);
     make_scene();
@@ -77,7 +78,9 @@ class RehearsalWindow {
   void open(const WindowOptions& options) {
     static std::string reason;
     glfwSetErrorCallback([](int, const char* text) { reason = text; });
-    if (glfwInit() == GLFW_FALSE) throw Error(ExitCode::failed, "no window can be opened: " + reason, "is there a display? Without one: osteo rehearse CASE --headless");
+    if (glfwInit() == GLFW_FALSE)
+      throw Error(ExitCode::failed, "no window can be opened: " + reason,
+                  "is there a display? Without one: osteo rehearse CASE --headless");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -217,7 +220,9 @@ class RehearsalWindow {
     const double far = length(centre_ - from) + 2 * radius_, step = bone.frame().spacing_mm.x / 2;
     for (double s = std::max(0.0, length(centre_ - from) - 2 * radius_); s < far; s += step) {
       const Vec3 i = bone.frame().index_from_world(from + ray * s);
-      if (bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5))) >= 0.5F) return from + ray * s;
+      if (bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
+                  static_cast<int>(std::floor(i.z + 0.5))) >= 0.5F)
+        return from + ray * s;
     }
     return std::nullopt;
   }
@@ -249,7 +254,8 @@ class RehearsalWindow {
     ImGui::Render();
 
     Rehearsal& rehearsal = actions_.rehearsal();
-    rehearsal.with_surface([&](const LiveSurface& surface, std::span<const std::uint32_t> changed) { bone_view_->update(surface, changed); });
+    rehearsal.with_surface(
+        [&](const LiveSurface& surface, std::span<const std::uint32_t> changed) { bone_view_->update(surface, changed); });
     const TickRecord tick = rehearsal.latest();
     place_tool(tick);
 
@@ -286,7 +292,8 @@ class RehearsalWindow {
   void mouse_and_keys() {
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
-    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 && m.y < static_cast<float>(height_) && !show_help_;
+    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
+                         m.y < static_cast<float>(height_) && !show_help_;
     vtkCamera* const camera = renderer_->GetActiveCamera();
     if (in_view && !io.WantCaptureMouse) {
       if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
@@ -298,7 +305,8 @@ class RehearsalWindow {
         camera->GetFocalPoint(f);
         camera->GetPosition(p);
         const Vec3 focal{f[0], f[1], f[2]};
-        const Vec3 shift = unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), focal) - unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
+        const Vec3 shift = unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), focal) -
+                           unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
         camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
         camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
       } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
@@ -336,17 +344,36 @@ class RehearsalWindow {
       case GLFW_KEY_F:
         if (in_view) bring_drill_to_bone(x, y);
         break;
-      case GLFW_KEY_SPACE: drill_latched_ = !drill_latched_; break;
-      case GLFW_KEY_S: screenshot_wanted_ = true; break;
+      case GLFW_KEY_SPACE:
+        drill_latched_ = !drill_latched_;
+        break;
+      case GLFW_KEY_S:
+        screenshot_wanted_ = true;
+        break;
       case GLFW_KEY_F1:
-      case GLFW_KEY_H: show_help_ = !show_help_; break;
-      case GLFW_KEY_R: reset(); break;
-      case GLFW_KEY_F5: save(); break;
-      case GLFW_KEY_Q: quit_ = true; break;
-      case GLFW_KEY_C: set_tool(tool_ % 7); break;
-      case GLFW_KEY_D: set_tool(tool_ % 7 + 7); break;
-      case GLFW_KEY_HOME: look_from(kFromLeft); break;
-      default: break;
+      case GLFW_KEY_H:
+        show_help_ = !show_help_;
+        break;
+      case GLFW_KEY_R:
+        reset();
+        break;
+      case GLFW_KEY_F5:
+        save();
+        break;
+      case GLFW_KEY_Q:
+        quit_ = true;
+        break;
+      case GLFW_KEY_C:
+        set_tool(tool_ % 7);
+        break;
+      case GLFW_KEY_D:
+        set_tool(tool_ % 7 + 7);
+        break;
+      case GLFW_KEY_HOME:
+        look_from(kFromLeft);
+        break;
+      default:
+        break;
     }
   }
 
@@ -412,7 +439,8 @@ class RehearsalWindow {
     if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_tool(tool_ / 7 * 7 + diameter - 1);
     ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
     ImGui::Separator();
-    const double force = length({static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2])});
+    const double force =
+        length({static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2])});
     char text[64];
     std::snprintf(text, sizeof text, "%.2f N", force);
     ImGui::Text("Force");
@@ -442,7 +470,8 @@ class RehearsalWindow {
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
     if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
-    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(bone_view_->triangles()) / 1e6, static_cast<double>(ImGui::GetIO().Framerate));
+    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(bone_view_->triangles()) / 1e6,
+                static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
     ImGui::TextWrapped("F1: mouse and keys");
     if (std::chrono::steady_clock::now() < message_until_) {
@@ -454,14 +483,16 @@ class RehearsalWindow {
 
   void slices() {
     const TickRecord tick = actions_.rehearsal().latest();
-    const Vec3 burr{static_cast<double>(tick.device.position_mm[0]), static_cast<double>(tick.device.position_mm[1]), static_cast<double>(tick.device.position_mm[2])};
+    const Vec3 burr{static_cast<double>(tick.device.position_mm[0]), static_cast<double>(tick.device.position_mm[1]),
+                    static_cast<double>(tick.device.position_mm[2])};
     if (follow_drill_) cross_ = burr;
     slices_age_ += static_cast<double>(ImGui::GetIO().DeltaTime);
     const float box = std::min(static_cast<float>(kSliceWidth - 16), (static_cast<float>(height_) - 110) / 3);
     const bool redraw = slices_age_ > 0.15;
     ImGui::SetNextWindowPos({static_cast<float>(width_ - kSliceWidth), 0});
     ImGui::SetNextWindowSize({static_cast<float>(kSliceWidth), static_cast<float>(height_)});
-    ImGui::Begin("Cuts", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
+    ImGui::Begin("Cuts", nullptr,
+                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
     ImGui::Checkbox("follow the drill", &follow_drill_);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(90);
@@ -469,7 +500,8 @@ class RehearsalWindow {
     const BrickGrid& bone = actions_.rehearsal().bone();
     const auto density = [&](Vec3 p) {
       const Vec3 i = bone.frame().index_from_world(p);
-      return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)), static_cast<int>(std::floor(i.z + 0.5)));
+      return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
+                     static_cast<int>(std::floor(i.z + 0.5)));
     };
     // What is left of the bone, in the grey of its CT value where the case has it.
     const GreyAt grey = [&](Vec3 p) {
@@ -508,7 +540,8 @@ class RehearsalWindow {
       const auto at = view.pixel(burr);
       const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2 / view.mm_per_pixel;
       draw->PushClipRect(corner, {corner.x + box, corner.y + box}, true);
-      draw->AddCircle({corner.x + static_cast<float>(at[0]), corner.y + static_cast<float>(at[1])}, static_cast<float>(std::max(2.0, r)), IM_COL32(255, 170, 60, 230), 24, 1.5F);
+      draw->AddCircle({corner.x + static_cast<float>(at[0]), corner.y + static_cast<float>(at[1])}, static_cast<float>(std::max(2.0, r)),
+                      IM_COL32(255, 170, 60, 230), 24, 1.5F);
       draw->PopClipRect();
     }
     if (redraw) slices_age_ = 0;

@@ -92,10 +92,12 @@ TEST(Files, AtomicWriteLeavesOldFileOnFailure) {
   const auto folder = fresh_folder();
   const auto path = folder / "a.txt";
   write_file(path, "old");
-  EXPECT_THROW(write_atomically(path, [](const auto& t) {
-    std::ofstream(t) << "half";
-    throw Error(ExitCode::failed, "stop");
-  }), Error);
+  EXPECT_THROW(write_atomically(path,
+                                [](const auto& t) {
+                                  std::ofstream(t) << "half";
+                                  throw Error(ExitCode::failed, "stop");
+                                }),
+               Error);
   EXPECT_EQ(read_text(path), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
 }
@@ -104,10 +106,12 @@ TEST(Files, FolderIsReplacedWholeOrNotAtAll) {
   const auto folder = fresh_folder() / "d";
   write_folder_atomically(folder, false, [](const auto& t) { std::ofstream(t / "one") << 1; });
   EXPECT_THROW(write_folder_atomically(folder, false, [](const auto&) {}), Error);
-  EXPECT_THROW(write_folder_atomically(folder, true, [](const auto& t) {
-    std::ofstream(t / "two") << 2;
-    throw Error(ExitCode::failed, "stop");
-  }), Error);
+  EXPECT_THROW(write_folder_atomically(folder, true,
+                                       [](const auto& t) {
+                                         std::ofstream(t / "two") << 2;
+                                         throw Error(ExitCode::failed, "stop");
+                                       }),
+               Error);
   EXPECT_TRUE(std::filesystem::exists(folder / "one"));
   write_folder_atomically(folder, true, [](const auto& t) { std::ofstream(t / "two") << 2; });
   EXPECT_FALSE(std::filesystem::exists(folder / "one"));
@@ -137,9 +141,11 @@ TEST(Parallel, ChunksCoverEachItemOnceForAnyThreadCount) {
 }
 
 TEST(Parallel, ExceptionReachesTheCaller) {
-  EXPECT_THROW(parallel_for(100, 1, 2, [](std::size_t b, std::size_t) {
-    if (b == 50) throw Error(ExitCode::failed, "x");
-  }), Error);
+  EXPECT_THROW(parallel_for(100, 1, 2,
+                            [](std::size_t b, std::size_t) {
+                              if (b == 50) throw Error(ExitCode::failed, "x");
+                            }),
+               Error);
 }
 
 TEST(Context, SubrangesNestAndCancelThrows) {

@@ -65,7 +65,9 @@ TEST(Resample, DensityIsTheShareOfTheVoxelInside) {
       for (int i = 5; i < f.dims[0] - 5; i += 3) {
         double inside = 0;
         for (int s = 0; s < 1000; ++s) {
-          inside += length(f.world_from_index({i + (s % 10 - 4.5) / 10, j + (s / 10 % 10 - 4.5) / 10, k + (s / 100 - 4.5) / 10})) < 20.3 ? 0.001 : 0;
+          inside += length(f.world_from_index({i + (s % 10 - 4.5) / 10, j + (s / 10 % 10 - 4.5) / 10, k + (s / 100 - 4.5) / 10})) < 20.3
+                        ? 0.001
+                        : 0;
         }
         const double e = std::abs(inside - static_cast<double>(bone.at(i, j, k)));
         worst = std::max(worst, e);
@@ -89,7 +91,9 @@ TEST(Resample, DroppedPiecesStayDropped) {
   std::size_t at = 0;
   for (int k = 0; k < 12; ++k)
     for (int j = 0; j < 12; ++j)
-      for (int i = 0; i < 30; ++i) v[at++] = (i > 2 && i < 11 && j > 1 && j < 10 && k > 1 && k < 10) || (i > 20 && i < 25 && j > 3 && j < 8 && k > 3 && k < 8) ? 1000 : 0;
+      for (int i = 0; i < 30; ++i)
+        v[at++] =
+            (i > 2 && i < 11 && j > 1 && j < 10 && k > 1 && k < 10) || (i > 20 && i < 25 && j > 3 && j < 8 && k > 3 && k < 8) ? 1000 : 0;
   const Image ct{f, v};
   ThresholdParams t;
   t.lower = 500;
@@ -97,7 +101,8 @@ TEST(Resample, DroppedPiecesStayDropped) {
   ResampleParams r;
   r.lower = 500;
   const auto bone = to_bricks(resample_bone(ct, threshold(ct, t), r).density);
-  const Vec3 in_small = bone.frame().index_from_world(f.world_from_index({22, 5, 5})), in_large = bone.frame().index_from_world(f.world_from_index({6, 5, 5}));
+  const Vec3 in_small = bone.frame().index_from_world(f.world_from_index({22, 5, 5})),
+             in_large = bone.frame().index_from_world(f.world_from_index({6, 5, 5}));
   EXPECT_EQ(bone.at(std::lround(in_small.x), std::lround(in_small.y), std::lround(in_small.z)), 0.0F);
   EXPECT_EQ(bone.at(std::lround(in_large.x), std::lround(in_large.y), std::lround(in_large.z)), 1.0F);
 }

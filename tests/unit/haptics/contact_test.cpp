@@ -186,7 +186,7 @@ TEST(SpringHand, RestsOnBoneInsteadOfPassingThrough) {
     highest = std::max(highest, pose.position_mm[2]);
   }
   EXPECT_GT(lowest, 1.4F);
-  EXPECT_LT(highest - lowest, 0.05F);  // at rest, but for the grain of the samples
+  EXPECT_LT(highest - lowest, 0.05F);           // at rest, but for the grain of the samples
   EXPECT_NEAR(mean_force, 0.8 * mean_z, 0.02);  // in balance with the spring
 }
 

@@ -97,11 +97,14 @@ Image image_of(std::array<int, 3> dims, const std::function<int(int, int, int)>&
   const auto v = make_voxels<std::int16_t>(frame.voxel_count());
   for (int k = 0; k < dims[2]; ++k)
     for (int j = 0; j < dims[1]; ++j)
-      for (int i = 0; i < dims[0]; ++i) v[(static_cast<std::size_t>(k) * dims[1] + j) * dims[0] + i] = static_cast<std::int16_t>(f(i, j, k));
+      for (int i = 0; i < dims[0]; ++i)
+        v[(static_cast<std::size_t>(k) * dims[1] + j) * dims[0] + i] = static_cast<std::int16_t>(f(i, j, k));
   return {frame, v};
 }
 
-std::size_t count(const Labels& l) { return static_cast<std::size_t>(std::count(l.span().begin(), l.span().end(), 1)); }
+std::size_t count(const Labels& l) {
+  return static_cast<std::size_t>(std::count(l.span().begin(), l.span().end(), 1));
+}
 
 TEST(Threshold, BoundsAreInclusive) {
   const auto ct = image_of({4, 1, 1}, [](int i, int, int) { return std::array{299, 300, 500, 501}[i]; });
@@ -114,7 +117,9 @@ TEST(Threshold, BoundsAreInclusive) {
 
 TEST(Threshold, HysteresisKeepsOnlyPiecesWithACore) {
   // Two bars of 400 HU, one of them with a voxel of 900.
-  const auto ct = image_of({20, 3, 3}, [](int i, int j, int k) { return j == 1 && k == 1 && i < 8 ? (i == 3 ? 900 : 400) : j == 1 && k == 1 && i > 10 ? 400 : 0; });
+  const auto ct = image_of({20, 3, 3}, [](int i, int j, int k) {
+    return j == 1 && k == 1 && i < 8 ? (i == 3 ? 900 : 400) : j == 1 && k == 1 && i > 10 ? 400 : 0;
+  });
   ThresholdParams p;
   p.min_volume_mm3 = 0;
   EXPECT_EQ(count(threshold(ct, p)), 17u);
@@ -129,7 +134,9 @@ TEST(Threshold, ClosingBridgesGapsAndFillingFillsCavities) {
   EXPECT_EQ(count(threshold(gap, p)), 250u);
   p.close_mm = 1;
   EXPECT_GT(count(threshold(gap, p)), 500u);
-  const auto shell = image_of({9, 9, 9}, [](int i, int j, int k) { return std::max({std::abs(i - 4), std::abs(j - 4), std::abs(k - 4)}) == 2 ? 500 : 0; });
+  const auto shell = image_of({9, 9, 9}, [](int i, int j, int k) {
+    return std::max({std::abs(i - 4), std::abs(j - 4), std::abs(k - 4)}) == 2 ? 500 : 0;
+  });
   ThresholdParams q;
   EXPECT_EQ(count(threshold(shell, q)), 125u - 27u);
   q.fill_mm3 = 26;
@@ -187,7 +194,8 @@ TEST(Phantom, LabelsAreTheExactTissue) {
   for (int k = 0; k < phantom.labels.frame.dims[2]; k += 3)
     for (int j = 0; j < phantom.labels.frame.dims[1]; j += 3)
       for (int i = 0; i < phantom.labels.frame.dims[0]; i += 3) {
-        EXPECT_EQ(phantom.labels.at(i, j, k), static_cast<int>(phantom_tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
+        EXPECT_EQ(phantom.labels.at(i, j, k),
+                  static_cast<int>(phantom_tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
       }
 }
 

@@ -107,12 +107,11 @@ TEST_P(EveryFormat, CutFileIsRefusedByName) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Io, EveryFormat, testing::Values(".nrrd", ".nii", ".nii.gz", ".mha", ".vti"),
-                         [](const auto& test) {
-                           std::string n = test.param;
-                           std::erase(n, '.');
-                           return n;
-                         });
+INSTANTIATE_TEST_SUITE_P(Io, EveryFormat, testing::Values(".nrrd", ".nii", ".nii.gz", ".mha", ".vti"), [](const auto& test) {
+  std::string n = test.param;
+  std::erase(n, '.');
+  return n;
+});
 
 TEST(Nrrd, RasBigEndianRawIsReadRight) {
   const auto path = folder() / "ras.nrrd";

@@ -44,8 +44,8 @@ TEST(Truth, VolumeOfBoneWithinOnePercentOfTheExactLabels) {
   EXPECT_NEAR(head().bone.volume_after_mm3 / exact, 1, 0.01);
   EXPECT_NEAR(head().bone.volume_after_mm3 / head().bone.volume_before_mm3, 1, 0.01);
   EXPECT_NEAR(enclosed_volume_mm3(head().nets.mesh) / exact, 1, 0.01);
-  std::printf("bone: exact labels %.0f mm3, 27 samples a voxel %.0f, mask %.0f, grid %.0f, surface %.0f\n", exact, head().phantom.bone_mm3, head().bone.volume_before_mm3,
-              head().bone.volume_after_mm3, enclosed_volume_mm3(head().nets.mesh));
+  std::printf("bone: exact labels %.0f mm3, 27 samples a voxel %.0f, mask %.0f, grid %.0f, surface %.0f\n", exact, head().phantom.bone_mm3,
+              head().bone.volume_before_mm3, head().bone.volume_after_mm3, enclosed_volume_mm3(head().nets.mesh));
 }
 
 // Distance of a surface point to the exact boundary along its normal, by bisection; at most 3 mm is looked for.

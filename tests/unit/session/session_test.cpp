@@ -119,9 +119,13 @@ TEST(Script, RoundTripAndErrorsSayWhere) {
     return "read";
   };
   EXPECT_NE(message("{}").find("header"), std::string::npos);
-  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4.5},"axis":[0,0,1],"waypoints":[]})").find("4.5 mm"), std::string::npos);
-  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4},"axis":[0,0,1],"waypoints":[{"t_s":1,"at_mm":[0,0,0]},{"t_s":1,"at_mm":[0,0,0]}]})").find("waypoint 2"),
+  EXPECT_NE(message(R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4.5},"axis":[0,0,1],"waypoints":[]})").find("4.5 mm"),
             std::string::npos);
+  EXPECT_NE(
+      message(
+          R"({"osteotome_strokes":1,"burr":{"kind":"cutting","diameter_mm":4},"axis":[0,0,1],"waypoints":[{"t_s":1,"at_mm":[0,0,0]},{"t_s":1,"at_mm":[0,0,0]}]})")
+          .find("waypoint 2"),
+      std::string::npos);
 }
 
 }  // namespace

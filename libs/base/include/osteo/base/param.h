@@ -37,10 +37,10 @@ struct FieldRef {
   FieldDoc doc;
   Target target;
 
-  [[nodiscard]] std::string_view kind() const;   ///< "flag", "int", "number", "text", "triple" or "choice"
-  [[nodiscard]] std::string to_text() const;     ///< round-trips through from_text
-  void from_text(std::string_view text) const;   ///< throws Error(usage) that names the field, the range and the choices
-  [[nodiscard]] std::string flag() const;        ///< "--half-width"
+  [[nodiscard]] std::string_view kind() const;  ///< "flag", "int", "number", "text", "triple" or "choice"
+  [[nodiscard]] std::string to_text() const;    ///< round-trips through from_text
+  void from_text(std::string_view text) const;  ///< throws Error(usage) that names the field, the range and the choices
+  [[nodiscard]] std::string flag() const;       ///< "--half-width"
 };
 
 namespace detail {

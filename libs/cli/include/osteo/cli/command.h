@@ -60,8 +60,8 @@ struct CommandInfo {
 struct Invocation {
   const Registry& registry;
   Common::Params common;
-  std::vector<std::string> arguments;                              ///< positionals, in order
-  std::vector<std::pair<std::string, std::string>> settings;       ///< --set k=v, in order
+  std::vector<std::string> arguments;                         ///< positionals, in order
+  std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
   Context context;
   std::ostream& out;
   std::ostream& err;

@@ -31,7 +31,9 @@ using Data = std::variant<std::monostate, Source, Image, Labels, SparseGrid, Sur
 /// In the order of the alternatives of Data.
 enum class DataKind : int { none, source, image, labels, grid, surface, picture };
 
-[[nodiscard]] inline DataKind kind_of(const Data& data) { return static_cast<DataKind>(data.index()); }
+[[nodiscard]] inline DataKind kind_of(const Data& data) {
+  return static_cast<DataKind>(data.index());
+}
 [[nodiscard]] constexpr std::string_view kind_name(DataKind kind) {
   constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture"};
   return names[static_cast<int>(kind)];

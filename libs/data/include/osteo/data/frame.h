@@ -27,9 +27,7 @@ struct Frame {
     const Vec3 v = inverse(direction) * (world_mm - origin_mm);
     return {v.x / spacing_mm.x, v.y / spacing_mm.y, v.z / spacing_mm.z};
   }
-  [[nodiscard]] Vec3 centre_mm() const {
-    return world_from_index({(dims[0] - 1) / 2.0, (dims[1] - 1) / 2.0, (dims[2] - 1) / 2.0});
-  }
+  [[nodiscard]] Vec3 centre_mm() const { return world_from_index({(dims[0] - 1) / 2.0, (dims[1] - 1) / 2.0, (dims[2] - 1) / 2.0}); }
   friend bool operator==(const Frame&, const Frame&) = default;
 };
 

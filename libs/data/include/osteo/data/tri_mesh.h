@@ -11,7 +11,7 @@ namespace osteo {
 
 struct TriMesh {
   std::vector<std::array<float, 3>> points_mm;
-  std::vector<std::array<float, 3>> normals;             ///< unit, outward; empty or one a point
+  std::vector<std::array<float, 3>> normals;            ///< unit, outward; empty or one a point
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
 };
 using Surface = std::shared_ptr<const TriMesh>;

@@ -22,9 +22,15 @@ struct Vec3 {
   friend constexpr bool operator==(Vec3, Vec3) = default;
 };
 
-constexpr double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-constexpr Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
+constexpr double dot(Vec3 a, Vec3 b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+constexpr Vec3 cross(Vec3 a, Vec3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double length(Vec3 a) {
+  return std::sqrt(dot(a, a));
+}
 /// The zero vector stays zero.
 inline Vec3 normalized(Vec3 a) {
   const double n = length(a);
@@ -39,13 +45,13 @@ inline Vec3 any_perpendicular(Vec3 a) {
 struct Mat3 {
   std::array<Vec3, 3> column{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
 
-  friend constexpr Vec3 operator*(const Mat3& m, Vec3 v) {
-    return m.column[0] * v.x + m.column[1] * v.y + m.column[2] * v.z;
-  }
+  friend constexpr Vec3 operator*(const Mat3& m, Vec3 v) { return m.column[0] * v.x + m.column[1] * v.y + m.column[2] * v.z; }
   friend constexpr bool operator==(const Mat3&, const Mat3&) = default;
 };
 
-constexpr double determinant(const Mat3& m) { return dot(m.column[0], cross(m.column[1], m.column[2])); }
+constexpr double determinant(const Mat3& m) {
+  return dot(m.column[0], cross(m.column[1], m.column[2]));
+}
 constexpr Mat3 transposed(const Mat3& m) {
   const auto& c = m.column;
   return {{Vec3{c[0].x, c[1].x, c[2].x}, Vec3{c[0].y, c[1].y, c[2].y}, Vec3{c[0].z, c[1].z, c[2].z}}};

@@ -43,7 +43,8 @@ class BrickGrid {
   [[nodiscard]] Ijk brick_coordinate(std::uint32_t brick) const { return origins_[brick]; }
   /// kNone when there is no such brick.
   [[nodiscard]] std::uint32_t find_brick(int bi, int bj, int bk) const {
-    if (static_cast<unsigned>(bi) >= extent_[0] || static_cast<unsigned>(bj) >= extent_[1] || static_cast<unsigned>(bk) >= extent_[2]) return kNone;
+    if (static_cast<unsigned>(bi) >= extent_[0] || static_cast<unsigned>(bj) >= extent_[1] || static_cast<unsigned>(bk) >= extent_[2])
+      return kNone;
     return table_[(static_cast<std::size_t>(bk) * extent_[1] + static_cast<std::size_t>(bj)) * extent_[0] + static_cast<std::size_t>(bi)];
   }
   [[nodiscard]] static constexpr std::uint32_t offset_in_brick(int i, int j, int k) {
@@ -59,9 +60,7 @@ class BrickGrid {
     const int o = static_cast<int>(key % kVoxels);
     return {b.i * 8 + (o & 7), b.j * 8 + (o >> 3 & 7), b.k * 8 + (o >> 6)};
   }
-  [[nodiscard]] float value(VoxelKey key) const {
-    return std::atomic_ref<float>(values_[key]).load(std::memory_order_relaxed);
-  }
+  [[nodiscard]] float value(VoxelKey key) const { return std::atomic_ref<float>(values_[key]).load(std::memory_order_relaxed); }
   [[nodiscard]] float at(int i, int j, int k) const {
     const VoxelKey key = find(i, j, k);
     return key == kNone ? 0.0F : value(key);

@@ -13,10 +13,10 @@ namespace osteo {
 
 /// What a device reports in a tick. Everything that happens follows from the sequence of these.
 struct DeviceSample {
-  std::array<float, 3> position_mm{};    ///< centre of the burr, LPS
-  std::array<float, 3> axis{0, 0, 1};    ///< unit, from burr to handle
+  std::array<float, 3> position_mm{};  ///< centre of the burr, LPS
+  std::array<float, 3> axis{0, 0, 1};  ///< unit, from burr to handle
   std::uint8_t drill_on = 0;
-  std::uint8_t tool = 0;                 ///< index in burr_library()
+  std::uint8_t tool = 0;  ///< index in burr_library()
   std::uint8_t reserved[2]{};
 };
 static_assert(sizeof(DeviceSample) == 28);
@@ -25,9 +25,9 @@ static_assert(sizeof(DeviceSample) == 28);
 struct TickRecord {
   std::uint64_t tick = 0;
   DeviceSample device;
-  std::array<float, 3> force_n{};   ///< on the hand
-  float depth_mm = 0;               ///< equivalent penetration of the burr
-  float removed_mm3 = 0;            ///< in this tick
+  std::array<float, 3> force_n{};  ///< on the hand
+  float depth_mm = 0;              ///< equivalent penetration of the burr
+  float removed_mm3 = 0;           ///< in this tick
   std::uint32_t voxels_changed = 0;
   std::uint32_t immersed_samples = 0;
   // Below: how the machine did. Not part of what replay must repeat.

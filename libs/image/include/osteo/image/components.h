@@ -28,7 +28,7 @@ struct Components {
 };
 
 /// Components of the voxels equal to `value` (0: background, 1: mask). O(voxels); memory O(runs).
-[[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims,
-                                              std::uint8_t value, Connectivity connectivity);
+[[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
+                                              Connectivity connectivity);
 
 }  // namespace osteo

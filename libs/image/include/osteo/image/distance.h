@@ -12,7 +12,7 @@ namespace osteo {
 /// For each voxel the squared distance in mm2 from its centre to the centre of the nearest voxel equal to `value`
 /// (infinity when there is none). Anisotropic spacing is honoured. O(voxels), in parallel over lines.
 /// Felzenszwalb and Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012.
-[[nodiscard]] std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, const Frame& frame,
-                                                      std::uint8_t value, const Context& context = {});
+[[nodiscard]] std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value,
+                                                      const Context& context = {});
 
 }  // namespace osteo

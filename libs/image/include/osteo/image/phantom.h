@@ -51,8 +51,8 @@ struct PhantomParams {
 };
 
 struct Phantom {
-  Image ct;            ///< mean HU over the voxel, the scanner's point spread (1 4 1)/6 along each axis, Gaussian noise
-  Labels labels;       ///< exact tissue at the voxel centre
+  Image ct;             ///< mean HU over the voxel, the scanner's point spread (1 4 1)/6 along each axis, Gaussian noise
+  Labels labels;        ///< exact tissue at the voxel centre
   double bone_mm3 = 0;  ///< by the same 27 samples a voxel
 };
 /// Same parameters, same bytes, for any number of threads.

@@ -27,8 +27,8 @@ struct ThresholdStage {
   static void describe(Params& p, auto& visit) {
     visit({"lower", "keep voxels at or above this value", "HU", -32768, 32767}, p.lower);
     visit({"upper", "keep voxels at or below this value", "HU", -32768, 32767}, p.upper);
-    visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)", "HU",
-           -32768, 32767}, p.core);
+    visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)", "HU", -32768, 32767},
+          p.core);
     visit({"close_mm", "close gaps narrower than twice this radius", "mm", 0, 20}, p.close_mm);
     visit({"fill_mm3", "fill enclosed cavities up to this volume", "mm3", 0, 1e9}, p.fill_mm3);
     visit({"min_volume_mm3", "drop pieces smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);

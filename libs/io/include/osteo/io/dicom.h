@@ -11,11 +11,11 @@ namespace osteo {
 
 /// What a person needs to choose a series. Holds nothing that names the patient.
 struct DicomSeries {
-  int number = 0;            ///< SeriesNumber as the scanner gave it
+  int number = 0;  ///< SeriesNumber as the scanner gave it
   std::string uid;
-  std::string modality;      ///< "CT", ...
-  std::string description;   ///< SeriesDescription; free text of the scanner
-  std::string kernel;        ///< ConvolutionKernel
+  std::string modality;     ///< "CT", ...
+  std::string description;  ///< SeriesDescription; free text of the scanner
+  std::string kernel;       ///< ConvolutionKernel
   int columns = 0, rows = 0, images = 0;
   double pixel_mm = 0, thickness_mm = 0;
   std::string what;          ///< "axial volume", "localizer", "no image position", "secondary capture", ...

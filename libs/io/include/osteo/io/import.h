@@ -22,7 +22,8 @@ struct ImportStage {
   static void describe(Params& p, auto& visit) {
     visit({"series", "DICOM series to take, by number or UID (empty: the one with the most slices)"}, p.series);
     visit({"max_gap_mm", "widest distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
-    visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"}, p.axes);
+    visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"},
+          p.axes);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

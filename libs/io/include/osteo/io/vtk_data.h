@@ -30,7 +30,7 @@ class QuietVtk {
   ~QuietVtk();
   QuietVtk(const QuietVtk&) = delete;
   QuietVtk& operator=(const QuietVtk&) = delete;
-  /// The first message since construction, without VTK's file and line; empty when there was none.
+  /// The first line of the first message since construction, without VTK's file and line; empty when there was none.
   [[nodiscard]] std::string first_message() const;
 
  private:

@@ -20,9 +20,9 @@ struct IndexRows {
 
 struct BoneSurface {
   TriMesh mesh;
-  std::vector<VoxelKey> voxels;    ///< the voxels on the surface, ascending
-  IndexRows vertices_of_voxel;     ///< one row a surface voxel
-  IndexRows triangles_of_vertex;   ///< one row a mesh point
+  std::vector<VoxelKey> voxels;   ///< the voxels on the surface, ascending
+  IndexRows vertices_of_voxel;    ///< one row a surface voxel
+  IndexRows triangles_of_vertex;  ///< one row a mesh point
 };
 
 /// Surface nets: a closed, oriented 2-manifold whatever the voxels are (open where the bone meets nothing: the outside of the

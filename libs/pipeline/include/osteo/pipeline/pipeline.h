@@ -19,9 +19,9 @@ struct PipelineNode {
   };
   std::string id;
   std::string stage;
-  std::map<std::string, std::string> params;               ///< field name -> text
-  std::map<std::string, Input> inputs;                      ///< port -> where from
-  std::map<std::string, std::filesystem::path> outputs;     ///< port -> file to write
+  std::map<std::string, std::string> params;             ///< field name -> text
+  std::map<std::string, Input> inputs;                   ///< port -> where from
+  std::map<std::string, std::filesystem::path> outputs;  ///< port -> file to write
 };
 
 struct Pipeline {

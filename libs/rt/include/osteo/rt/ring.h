@@ -33,7 +33,9 @@ class Ring {
   bool push(const T& item) noexcept { return push(std::span<const T>(&item, 1)); }
 
   /// Producer: items that push() has room for now; only grows until the next push().
-  [[nodiscard]] std::size_t room() const noexcept { return mask_ + 1 - (tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire)); }
+  [[nodiscard]] std::size_t room() const noexcept {
+    return mask_ + 1 - (tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire));
+  }
 
   /// Consumer: takes up to out.size() items, returns how many.
   std::size_t pop(std::span<T> out) noexcept {

@@ -25,9 +25,9 @@ struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;
   std::string bone_hash, surface_hash;
-  std::uint64_t dropped = 0;       ///< ticks that a reader lost
+  std::uint64_t dropped = 0;  ///< ticks that a reader lost
   std::uint64_t session_bytes = 0;
-  std::optional<LoopStats> loop;   ///< only when it ran by the clock
+  std::optional<LoopStats> loop;  ///< only when it ran by the clock
 };
 
 /// Owns the bone while it runs. The servo thread writes it; the recorder, the surface follower and whoever asks for a
@@ -84,9 +84,9 @@ class Rehearsal {
 /// What a replay found.
 struct ReplayResult {
   std::uint64_t ticks = 0;
-  bool complete = false;      ///< the session was closed properly
-  bool identical = false;     ///< every tick, and (when complete) bone and surface, came out bit for bit the same
-  std::string difference;     ///< the first one
+  bool complete = false;   ///< the session was closed properly
+  bool identical = false;  ///< every tick, and (when complete) bone and surface, came out bit for bit the same
+  std::string difference;  ///< the first one
   std::string bone_hash, surface_hash;
   double removed_mm3 = 0;
   double seconds = 0;

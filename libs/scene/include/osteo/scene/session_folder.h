@@ -19,7 +19,8 @@ struct SessionFolder {
 
 /// Makes a new, empty folder: `wanted`, or when that is empty CASE/sessions/N with the first free N. Writes session.json,
 /// which ties it to the case by relative paths. Error(cannot_write) when `wanted` holds something.
-[[nodiscard]] SessionFolder create_session_folder(const std::filesystem::path& wanted, const std::filesystem::path& case_folder, const std::filesystem::path& resumed_from);
+[[nodiscard]] SessionFolder create_session_folder(const std::filesystem::path& wanted, const std::filesystem::path& case_folder,
+                                                  const std::filesystem::path& resumed_from);
 
 /// Errors: no_input, corrupt. `case_folder` overrides what the session says when it is not empty.
 [[nodiscard]] SessionFolder open_session_folder(const std::filesystem::path& folder, const std::filesystem::path& case_folder = {});

@@ -15,7 +15,7 @@ namespace osteo {
 /// What a replay needs to know before the first tick.
 struct SessionHeader {
   std::string program_version;
-  std::string bone_hash;        ///< of the bone before the first tick
+  std::string bone_hash;  ///< of the bone before the first tick
   double rate_hz = 1000;
   int burr_library = kBurrLibraryVersion;
   ContactParams contact;

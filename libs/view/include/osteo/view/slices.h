@@ -13,8 +13,8 @@ enum class Plane : int { axial, coronal, sagittal };
 
 struct SliceView {
   Plane plane = Plane::axial;
-  Vec3 through_mm;        ///< the point that the cut passes through
-  Vec3 centre_mm;         ///< what lies at the centre of the picture
+  Vec3 through_mm;  ///< the point that the cut passes through
+  Vec3 centre_mm;   ///< what lies at the centre of the picture
   double mm_per_pixel = 1;
   int width = 256, height = 256;
 

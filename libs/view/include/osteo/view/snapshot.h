@@ -22,9 +22,9 @@ struct SnapshotParams {
 };
 
 struct SnapshotSubjects {
-  Data subject;            ///< image, labels, grid or surface
-  Data mask;               ///< labels or grid, tinted over the cuts; optional
-  Data surface;            ///< shown in 3D instead of one made here; optional
+  Data subject;  ///< image, labels, grid or surface
+  Data mask;     ///< labels or grid, tinted over the cuts; optional
+  Data surface;  ///< shown in 3D instead of one made here; optional
 };
 
 /// Works without a display. Error(failed) when there is no OpenGL.
