@@ -26,13 +26,12 @@
 #include <cstring>
 #include <optional>
 
+#include "cuts_panel.h"
 #include "osteo/base/error.h"
-#include "osteo/grid/sampler.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/offscreen.h"
-#include "osteo/view/slices.h"
 
 namespace osteo {
 namespace {
@@ -45,7 +44,7 @@ class RehearsalWindow {
  public:
   RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
       : actions_(actions), tool_(options.tool) {
-    if (hu != nullptr) hu_.emplace(*hu);
+    if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
     make_scene();
     new_bone();
@@ -55,7 +54,7 @@ class RehearsalWindow {
 
   ~RehearsalWindow() {
     glfwMakeContextCurrent(window_);
-    glDeleteTextures(3, textures_.data());
+    cuts_.release();
     bone_view_.reset();
     render_window_->Finalize();
     ImGui_ImplOpenGL3_Shutdown();
@@ -114,12 +113,7 @@ class RehearsalWindow {
     ImGui::GetStyle().WindowRounding = 0;
     ImGui_ImplGlfw_InitForOpenGL(window_, true);
     ImGui_ImplOpenGL3_Init("#version 150");
-    glGenTextures(3, textures_.data());
-    for (const GLuint t : textures_) {
-      glBindTexture(GL_TEXTURE_2D, t);
-      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-      glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    }
+    cuts_.create();
   }
 
   void make_scene() {
@@ -160,7 +154,7 @@ class RehearsalWindow {
     }
     centre_ = (lo + hi) * 0.5;
     radius_ = std::max(5.0, 0.5 * length(hi - lo));
-    slices_age_ = 1e9;
+    cuts_.renew();
   }
 
   void look_from(Vec3 eye) { look_at(renderer_, centre_, 0.8 * radius_, normalized(eye)); }
@@ -249,7 +243,8 @@ class RehearsalWindow {
     ImGui::NewFrame();
     mouse_and_keys();
     panel();
-    slices();
+    cuts_.draw(actions_.rehearsal(), tool_,
+               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) help();
     ImGui::Render();
 
@@ -481,73 +476,6 @@ class RehearsalWindow {
     ImGui::End();
   }
 
-  void slices() {
-    const TickRecord tick = actions_.rehearsal().latest();
-    const Vec3 burr{static_cast<double>(tick.device.position_mm[0]), static_cast<double>(tick.device.position_mm[1]),
-                    static_cast<double>(tick.device.position_mm[2])};
-    if (follow_drill_) cross_ = burr;
-    slices_age_ += static_cast<double>(ImGui::GetIO().DeltaTime);
-    const float box = std::min(static_cast<float>(kSliceWidth - 16), (static_cast<float>(height_) - 110) / 3);
-    const bool redraw = slices_age_ > 0.15;
-    ImGui::SetNextWindowPos({static_cast<float>(width_ - kSliceWidth), 0});
-    ImGui::SetNextWindowSize({static_cast<float>(kSliceWidth), static_cast<float>(height_)});
-    ImGui::Begin("Cuts", nullptr,
-                 ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
-    ImGui::Checkbox("follow the drill", &follow_drill_);
-    ImGui::SameLine();
-    ImGui::SetNextItemWidth(90);
-    ImGui::SliderFloat("mm", &slice_mm_, 20, 250, "%.0f");
-    const BrickGrid& bone = actions_.rehearsal().bone();
-    const auto density = [&](Vec3 p) {
-      const Vec3 i = bone.frame().index_from_world(p);
-      return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
-                     static_cast<int>(std::floor(i.z + 0.5)));
-    };
-    // What is left of the bone, in the grey of its CT value where the case has it.
-    const GreyAt grey = [&](Vec3 p) {
-      const double d = static_cast<double>(density(p));
-      if (d <= 0) return 0.0;
-      return d * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(p)))) : 220.0);
-    };
-    static constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
-    for (int n = 0; n < 3; ++n) {
-      SliceView view;
-      view.plane = static_cast<Plane>(n);
-      view.centre_mm = view.through_mm = cross_;
-      view.width = view.height = static_cast<int>(box);
-      view.mm_per_pixel = static_cast<double>(slice_mm_) / view.width;
-      if (redraw) {
-        Picture picture = draw_slice(view, grey);
-        write_directions(picture, view, 0, 0);
-        glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(n)]);
-        glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, picture.width, picture.height, 0, GL_RGB, GL_UNSIGNED_BYTE, picture.rgb.data());
-        glBindTexture(GL_TEXTURE_2D, 0);
-      }
-      ImGui::Text("%s", kNames[n]);
-      const ImVec2 corner = ImGui::GetCursorScreenPos();
-      ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(textures_[static_cast<std::size_t>(n)])), {box, box});
-      if (ImGui::IsItemClicked()) {
-        const ImVec2 m = ImGui::GetMousePos();
-        cross_ = view.world(static_cast<double>(m.x - corner.x), static_cast<double>(m.y - corner.y));
-        follow_drill_ = false;
-        slices_age_ = 1e9;
-      }
-      ImDrawList* const draw = ImGui::GetWindowDrawList();
-      const float half = box / 2;
-      draw->AddLine({corner.x + half, corner.y}, {corner.x + half, corner.y + box}, IM_COL32(90, 160, 255, 90));
-      draw->AddLine({corner.x, corner.y + half}, {corner.x + box, corner.y + half}, IM_COL32(90, 160, 255, 90));
-      const auto at = view.pixel(burr);
-      const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2 / view.mm_per_pixel;
-      draw->PushClipRect(corner, {corner.x + box, corner.y + box}, true);
-      draw->AddCircle({corner.x + static_cast<float>(at[0]), corner.y + static_cast<float>(at[1])}, static_cast<float>(std::max(2.0, r)),
-                      IM_COL32(255, 170, 60, 230), 24, 1.5F);
-      draw->PopClipRect();
-    }
-    if (redraw) slices_age_ = 0;
-    ImGui::End();
-  }
-
   void help() {
     ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 220, 90}, ImGuiCond_Appearing);
     ImGui::SetNextWindowSize({460, 0});
@@ -574,7 +502,6 @@ class RehearsalWindow {
   }
 
   WindowActions actions_;
-  std::optional<GridSampler> hu_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
@@ -584,14 +511,13 @@ class RehearsalWindow {
   vtkNew<vtkActor> burr_, shaft_;
   vtkNew<vtkMatrix4x4> tool_matrix_;
   std::unique_ptr<BoneView> bone_view_;
-  std::array<GLuint, 3> textures_{};
-  Vec3 centre_{}, cross_{};
-  double radius_ = 100, slices_age_ = 1e9;
-  float slice_mm_ = 90;
+  CutsPanel cuts_;
+  Vec3 centre_{};
+  double radius_ = 100;
   HandGoal goal_;
   int tool_;
   int gl_errors_ = 0;
-  bool drill_latched_ = false, drill_held_ = false, follow_drill_ = true, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
+  bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   std::vector<KeyPress> pressed_keys_;
   std::string message_;
   std::chrono::steady_clock::time_point message_until_{};

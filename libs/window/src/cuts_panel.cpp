@@ -1,0 +1,95 @@
+#include "cuts_panel.h"
+
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/view/slices.h"
+
+namespace osteo {
+
+void CutsPanel::create() {
+  glGenTextures(3, textures_.data());
+  for (const unsigned t : textures_) {
+    glBindTexture(GL_TEXTURE_2D, t);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  }
+  glBindTexture(GL_TEXTURE_2D, 0);
+}
+
+void CutsPanel::release() {
+  glDeleteTextures(3, textures_.data());
+}
+
+void CutsPanel::draw(const Rehearsal& rehearsal, int tool, Box box) {
+  const TickRecord tick = rehearsal.latest();
+  const auto& p = tick.device.position_mm;
+  const Vec3 burr{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+  if (follow_drill_) cross_ = burr;
+  age_s_ += static_cast<double>(ImGui::GetIO().DeltaTime);
+  const bool redraw = age_s_ > 0.15;
+  if (redraw) age_s_ = 0;
+  const float edge = std::max(40.0F, std::min(box.width - 16, (box.height - 110) / 3));
+
+  ImGui::SetNextWindowPos({box.x, box.y});
+  ImGui::SetNextWindowSize({box.width, box.height});
+  ImGui::Begin("Cuts", nullptr,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoScrollbar);
+  ImGui::Checkbox("follow the drill", &follow_drill_);
+  ImGui::SameLine();
+  ImGui::SetNextItemWidth(90);
+  ImGui::SliderFloat("mm", &span_mm_, 20, 250, "%.0f");
+
+  // What is left of the bone, in the grey of its CT value where the case has it.
+  const BrickGrid& bone = rehearsal.bone();
+  const GreyAt grey = [&](Vec3 at) {
+    const Vec3 i = bone.frame().index_from_world(at);
+    const auto nearest = [](double x) { return static_cast<int>(std::floor(x + 0.5)); };
+    const double density = static_cast<double>(bone.at(nearest(i.x), nearest(i.y), nearest(i.z)));
+    if (density <= 0) return 0.0;
+    return density * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(at)))) : 220.0);
+  };
+  static constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
+  for (std::size_t n = 0; n < 3; ++n) {
+    SliceView view;
+    view.plane = static_cast<Plane>(n);
+    view.centre_mm = view.through_mm = cross_;
+    view.width = view.height = static_cast<int>(edge);
+    view.mm_per_pixel = static_cast<double>(span_mm_) / view.width;
+    if (redraw) {
+      Picture picture = draw_slice(view, grey);
+      write_directions(picture, view, 0, 0);
+      glBindTexture(GL_TEXTURE_2D, textures_[n]);
+      glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+      glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, picture.width, picture.height, 0, GL_RGB, GL_UNSIGNED_BYTE, picture.rgb.data());
+      glBindTexture(GL_TEXTURE_2D, 0);
+    }
+    ImGui::Text("%s", kNames[n]);
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
+    ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(textures_[n])), {edge, edge});
+    if (ImGui::IsItemClicked()) {
+      const ImVec2 m = ImGui::GetMousePos();
+      cross_ = view.world(static_cast<double>(m.x - corner.x), static_cast<double>(m.y - corner.y));
+      follow_drill_ = false;
+      renew();
+    }
+    ImDrawList* const draw = ImGui::GetWindowDrawList();
+    const float half = edge / 2;
+    draw->AddLine({corner.x + half, corner.y}, {corner.x + half, corner.y + edge}, IM_COL32(90, 160, 255, 90));
+    draw->AddLine({corner.x, corner.y + half}, {corner.x + edge, corner.y + half}, IM_COL32(90, 160, 255, 90));
+    const auto at = view.pixel(burr);
+    const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2 / view.mm_per_pixel;
+    draw->PushClipRect(corner, {corner.x + edge, corner.y + edge}, true);
+    draw->AddCircle({corner.x + static_cast<float>(at[0]), corner.y + static_cast<float>(at[1])}, static_cast<float>(std::max(2.0, radius)),
+                    IM_COL32(255, 170, 60, 230), 24, 1.5F);
+    draw->PopClipRect();
+  }
+  ImGui::End();
+}
+
+}  // namespace osteo

@@ -1,0 +1,7 @@
+// Session streams: whatever a crash or a bad disk leaves.
+#include "file_target.h"
+#include "osteo/session/session_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  return fuzz_file(data, size, ".oss", [](const std::string& path) { static_cast<void>(osteo::read_session(path)); });
+}
