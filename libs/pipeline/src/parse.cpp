@@ -54,9 +54,17 @@ std::string substitute(std::string text, const std::map<std::string, std::string
   return text;
 }
 
-}  // namespace
+// A value of the wrong JSON type somewhere deep becomes an Error like any other.
+template <class F>
+auto with_json_errors(F&& read) {
+  try {
+    return read();
+  } catch (const json::exception& e) {
+    fail("", "a value has the wrong type", e.what());
+  }
+}
 
-std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
+std::vector<PipelineVariable> read_variables(std::string_view text) {
   std::vector<PipelineVariable> result;
   const json root = parse_json(text);
   if (!root.contains("variables")) return result;
@@ -69,7 +77,7 @@ std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
   return result;
 }
 
-Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
+Pipeline read_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
   const json root = parse_json(text);
   allow_keys(root, "", {"osteotome", "name", "description", "variables", "stages"});
   if (!root.contains("osteotome") || root["osteotome"] != 1)
@@ -78,7 +86,7 @@ Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::
 
   std::map<std::string, std::string> variables;
   std::vector<std::string> known;
-  for (const auto& v : pipeline_variables(text)) {
+  for (const auto& v : read_variables(text)) {
     known.push_back(v.name);
     if (v.fallback) variables[v.name] = *v.fallback;
   }
@@ -146,6 +154,16 @@ Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::
                 near.empty() ? "" : "did you mean '" + near + "'?");
   }
   return pipeline;
+}
+
+}  // namespace
+
+std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
+  return with_json_errors([&] { return read_variables(text); });
+}
+
+Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
+  return with_json_errors([&] { return read_pipeline(text, settings); });
 }
 
 }  // namespace osteo

@@ -39,7 +39,8 @@ std::vector<std::string> names_of(const std::vector<Port>& ports) {
 
 void set_params(Stage& stage, const PipelineNode& node) {
   auto fields = stage.fields();
-  for (const auto& [name, text] : node.params) {
+  for (const auto& param : node.params) {
+    const std::string &name = param.first, &text = param.second;
     const auto it = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
     if (it == fields.end()) {
       std::vector<std::string> known;
