@@ -2,6 +2,7 @@
 
 #include <openvdb/tools/Prune.h>
 
+#include <fstream>
 #include <mutex>
 
 #include "osteo/base/error.h"
@@ -113,6 +114,23 @@ SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name) {
   return grid::wrap(vdb, bricks.frame(), name);
 }
 
+namespace {
+
+// OpenVDB gives each file a random UUID; ours follows from the content, so that the same grid is the same bytes.
+void make_uuid_of_content(const fs::path& path) {
+  constexpr std::size_t kAt = 21, kLength = 36;  // after magic, versions and the offsets flag; 8-4-4-4-12 hex digits
+  std::string bytes = read_text(path);
+  if (bytes.size() < kAt + kLength || bytes[kAt + 8] != '-' || bytes[kAt + 23] != '-') return;
+  bytes.replace(kAt, kLength, kLength, '0');
+  std::string uuid = hash_text(bytes);
+  for (const std::size_t dash : {8, 13, 18, 23}) uuid.insert(dash, "-");
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(static_cast<std::streamoff>(kAt));
+  file.write(uuid.data(), static_cast<std::streamsize>(kLength));
+}
+
+}  // namespace
+
 void save_grid(const SparseGrid& sparse, const fs::path& path) {
   if (path.extension() != ".vdb")
     throw Error(ExitCode::usage, "cannot write a sparse grid as '" + path.filename().string() + "'", "name it .vdb");
@@ -132,6 +150,7 @@ void save_grid(const SparseGrid& sparse, const fs::path& path) {
     } catch (const openvdb::Exception& e) {
       throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + e.what(), "see that the disk has room");
     }
+    make_uuid_of_content(temporary);
     // OpenVDB does not report a short write: read the file's structure back.
     try {
       openvdb::io::File check(temporary.string());
