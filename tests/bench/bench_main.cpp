@@ -51,7 +51,8 @@ Image ball(double spacing_z) {
   for (int k = 0; k < f.dims[2]; ++k)
     for (int j = 0; j < f.dims[1]; ++j)
       for (int i = 0; i < f.dims[0]; ++i) {
-        v[at++] = static_cast<std::int16_t>(std::lround(500 + 500 * std::tanh((kRadius - length(f.world_from_index({double(i), double(j), double(k)}))) / 1.5)));
+        v[at++] = static_cast<std::int16_t>(
+            std::lround(500 + 500 * std::tanh((kRadius - length(f.world_from_index({double(i), double(j), double(k)}))) / 1.5)));
       }
   return {f, v};
 }
@@ -84,7 +85,9 @@ std::vector<Vec3> points_of(vtkPolyData* m) {
 }
 
 void bench_resample(const Context& context) {
-  std::printf("## Resampling: a ball of radius 20.3 mm, threshold half-way\n\n| CT voxels mm | method | voxels mm | ms | volume error %% | boundary off, mean mm | p99 mm |\n|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "## Resampling: a ball of radius 20.3 mm, threshold half-way\n\n| CT voxels mm | method | voxels mm | ms | volume error %% | "
+      "boundary off, mean mm | p99 mm |\n|---|---|---|---|---|---|---|\n");
   const double exact = 4.0 / 3 * M_PI * std::pow(kRadius, 3);
   for (const double z : {1.0, 2.0}) {
     const Image ct = ball(z);
@@ -98,7 +101,8 @@ void bench_resample(const Context& context) {
       ResampledBone bone;
       const double s = seconds([&] { bone = resample_bone(ct, mask, r, context); });
       const Off o = off_the_ball(points_of(surface_nets(to_bricks(bone.density), 0.5F, context).mesh));
-      std::printf("| 1x1x%g | osteo resample | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * s, 100 * (bone.volume_after_mm3 / exact - 1), o.mean, o.p99);
+      std::printf("| 1x1x%g | osteo resample | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * s,
+                  100 * (bone.volume_after_mm3 / exact - 1), o.mean, o.p99);
       // Peer: what thresholding first and resampling the mask gives (VTK's cubic reslice of the mask).
       vtkSmartPointer<vtkPolyData> surface;
       double volume = 0;
@@ -119,7 +123,8 @@ void bench_resample(const Context& context) {
         surface = edges->GetOutput();
       });
       const Off po = off_the_ball(points_of(surface));
-      std::printf("| 1x1x%g | mask, VTK cubic reslice | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * ps, 100 * (volume / exact - 1), po.mean, po.p99);
+      std::printf("| 1x1x%g | mask, VTK cubic reslice | %g | %.1f | %+.3f | %.4f | %.4f |\n", z, h, 1000 * ps, 100 * (volume / exact - 1),
+                  po.mean, po.p99);
     }
   }
 }
@@ -163,7 +168,8 @@ void bench_surface(const Context& context) {
   const auto closed = [](const TriMesh& m) {
     const MeshCheck c = check(m);
     static std::string text;
-    text = std::string(c.watertight() ? "yes" : "no") + ", " + (c.manifold() ? "yes" : "no (" + std::to_string(c.nonmanifold_edges) + " edges)");
+    text = std::string(c.watertight() ? "yes" : "no") + ", " +
+           (c.manifold() ? "yes" : "no (" + std::to_string(c.nonmanifold_edges) + " edges)");
     return text.c_str();
   };
   BoneSurface nets;
@@ -175,7 +181,8 @@ void bench_surface(const Context& context) {
   row("surface nets", s, nets.mesh.triangles.size(), closed(nets.mesh), off_the_ball(points_of(surface_nets(small).mesh)));
   BoneSurface voxels;
   s = seconds([&] { voxels = voxel_surface(head, 0.5F, context); });
-  row("voxel triangulation (thesis)", s, voxels.mesh.triangles.size(), closed(voxels.mesh), off_the_ball(points_of(voxel_surface(small).mesh)));
+  row("voxel triangulation (thesis)", s, voxels.mesh.triangles.size(), closed(voxels.mesh),
+      off_the_ball(points_of(voxel_surface(small).mesh)));
   const auto dense_head = dense_of(head), dense_small = dense_of(small);
   const auto vtk_row = [&](const char* name, auto filter) {
     vtkSmartPointer<vtkPolyData> out;
@@ -234,11 +241,15 @@ void bench_surface(const Context& context) {
     times.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   }
   std::sort(times.begin(), times.end());
-  std::printf("\nA 4 mm burr's worth of changed voxels to new triangles, one thread: p50 %.2f ms, p99 %.2f ms (a rebuild of all: %.0f ms).\n", 1000 * times[200], 1000 * times[395], 1000 * s);
+  std::printf(
+      "\nA 4 mm burr's worth of changed voxels to new triangles, one thread: p50 %.2f ms, p99 %.2f ms (a rebuild of all: %.0f ms).\n",
+      1000 * times[200], 1000 * times[395], 1000 * s);
 }
 
 void bench_contact() {
-  std::printf("\n## Contact by volume sampling: burr 1 mm deep in flat bone\n\n| burr mm | voxels mm | us a tick (force + removal) | depth error, mean mm | worst mm |\n|---|---|---|---|---|\n");
+  std::printf(
+      "\n## Contact by volume sampling: burr 1 mm deep in flat bone\n\n| burr mm | voxels mm | us a tick (force + removal) | depth error, "
+      "mean mm | worst mm |\n|---|---|---|---|---|\n");
   for (const double h : {0.2, 0.5, 1.0}) {
     Frame f;
     f.dims = {static_cast<int>(24 / h), static_cast<int>(24 / h), static_cast<int>(12 / h)};
@@ -251,7 +262,8 @@ void bench_contact() {
     const double top = 8.137;
     for (int k = 0; k < f.dims[2]; ++k)
       for (int j = 0; j < f.dims[1]; ++j)
-        for (int i = 0; i < f.dims[0]; ++i) bone.set(bone.find(i, j, k), static_cast<float>(std::clamp((top - (k - 0.5) * h) / h, 0.0, 1.0)));
+        for (int i = 0; i < f.dims[0]; ++i)
+          bone.set(bone.find(i, j, k), static_cast<float>(std::clamp((top - (k - 0.5) * h) / h, 0.0, 1.0)));
     for (const int tool : {1, 3, 5}) {
       const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
       const double depth = std::min(1.0, radius);

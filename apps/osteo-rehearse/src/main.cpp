@@ -11,21 +11,10 @@
 namespace osteo {
 namespace {
 
-enum class BurrChoice : int { cutting, diamond };
-
-}  // namespace
-
-template <>
-struct EnumNames<BurrChoice> {
-  static constexpr std::array<std::string_view, 2> values{"cutting", "diamond"};
-};
-
-namespace {
-
 struct WindowCommand {
   struct Params {
     std::string out;
-    BurrChoice burr = BurrChoice::cutting;
+    BurrKind burr = BurrKind::cutting;
     double diameter_mm = 4;
     double rate_hz = 1000;
     std::string resume;
@@ -53,7 +42,7 @@ struct WindowCommand {
     const Case the_case = load_case(io.arguments[0]);
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
-    const int tool = burr_index(std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]), p.diameter_mm);
+    const int tool = burr_index(p.burr, p.diameter_mm);
 
     SessionFolder session;
     std::unique_ptr<Rehearsal> rehearsal;

@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
 
 namespace osteo {
@@ -72,13 +73,7 @@ struct PrepareCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
-enum class BurrChoice : int { cutting, diamond };
 enum class Side : int { left, right };
-
-template <>
-struct EnumNames<BurrChoice> {
-  static constexpr std::array<std::string_view, 2> values{"cutting", "diamond"};
-};
 template <>
 struct EnumNames<Side> {
   static constexpr std::array<std::string_view, 2> values{"left", "right"};
@@ -89,7 +84,7 @@ struct RehearseCommand {
     bool headless = false;
     std::string script;
     std::string out;
-    BurrChoice burr = BurrChoice::cutting;
+    BurrKind burr = BurrKind::cutting;
     double diameter_mm = 4;
     Side side = Side::left;
     double seconds = 60;

@@ -129,7 +129,8 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
   ordered_json j;
   if (fs::is_directory(path)) {
     j = ordered_json::parse(read_text(path / "manifest.json"), nullptr, false);
-    if (j.is_discarded()) throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
+    if (j.is_discarded())
+      throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
   } else {
     static constexpr std::array kAny{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::picture};
     j["file"] = path.string();

@@ -31,7 +31,7 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
     throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
                 "build with -DOSTEO_WINDOW=ON, or use --headless");
   std::vector<std::string> args{program.string(), io.arguments[0],
-                                "--burr",         std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]),
+                                "--burr",         std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(p.burr)]),
                                 "--diameter-mm",  format_number(p.diameter_mm),
                                 "--rate-hz",      format_number(p.rate_hz)};
   if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
@@ -56,7 +56,7 @@ cli::CommandInfo RehearseCommand::info() {
 }
 
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
-  const int tool = burr_index(std::string(EnumNames<BurrChoice>::values[static_cast<std::size_t>(p.burr)]), p.diameter_mm);
+  const int tool = burr_index(p.burr, p.diameter_mm);
   if (!p.headless) return open_window(p, io);
   const Case the_case = load_case(io.arguments[0]);
   io.context.progress(0, "loading");

@@ -10,7 +10,7 @@
 namespace osteo {
 
 std::string Burr::name() const {
-  return std::string(kind == BurrKind::cutting ? "cutting " : "diamond ") + format_number(diameter_mm) + " mm";
+  return std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]) + " " + format_number(diameter_mm) + " mm";
 }
 
 const std::vector<Burr>& burr_library() {
@@ -25,12 +25,12 @@ const std::vector<Burr>& burr_library() {
   return library;
 }
 
-int burr_index(const std::string& kind, double diameter_mm) {
+int burr_index(BurrKind kind, double diameter_mm) {
   const auto& all = burr_library();
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if ((all[i].kind == BurrKind::cutting) == (kind == "cutting") && all[i].diameter_mm == diameter_mm) return static_cast<int>(i);
+    if (all[i].kind == kind && all[i].diameter_mm == diameter_mm) return static_cast<int>(i);
   }
-  throw Error(ExitCode::usage, "there is no " + kind + " burr of " + format_number(diameter_mm) + " mm",
+  throw Error(ExitCode::usage, "there is no burr of " + format_number(diameter_mm) + " mm",
               "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
 }
 

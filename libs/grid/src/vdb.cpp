@@ -179,10 +179,12 @@ SparseGrid load_grid(const fs::path& path) {
     }
     throw Error(ExitCode::corrupt, "'" + path.string() + "' holds no grid of floats");
   } catch (const openvdb::Exception& e) {
-    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: " + e.what(), "the file may be cut short; make it again");
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: " + e.what(),
+                "the file may be cut short; make it again");
   } catch (const std::bad_alloc&) {
     // OpenVDB takes lengths from a cut file as they come.
-    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: it asks for more memory than there is", "the file may be cut short; make it again");
+    throw Error(ExitCode::corrupt, "'" + path.string() + "' cannot be read as OpenVDB: it asks for more memory than there is",
+                "the file may be cut short; make it again");
   }
 }
 

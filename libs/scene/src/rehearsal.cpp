@@ -199,11 +199,6 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
   // The mastoid of most heads lies behind and below the middle of their bone.
   const Vec3 centre = sum / weight + Vec3{0, 20, -22};
   const Vec3 out{left ? 1.0 : -1.0, 0, 0};
-  const auto density_at = [&](Vec3 p) {
-    const Vec3 i = bone.frame().index_from_world(p);
-    return bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
-                   static_cast<int>(std::floor(i.z + 0.5)));
-  };
   // The outside of the first bone met that is followed by 20 mm of nothing (air cells, the ear canal and a gap to a head holder are
   // narrower and wider); try rays around the centre until one meets bone.
   std::optional<Vec3> entry;
@@ -215,7 +210,7 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
       const Vec3 from = centre + Vec3{0, 2.0 * ring * std::cos(angle), 2.0 * ring * std::sin(angle)};
       double bone_end = -1;
       for (double s = 0; s < longest; s += 0.25) {
-        if (density_at(from + out * s) >= 0.5F) {
+        if (bone.nearest(from + out * s) >= 0.5F) {
           bone_end = s;
         } else if (bone_end >= 0 && s - bone_end > 20) {
           break;

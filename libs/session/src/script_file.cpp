@@ -25,7 +25,11 @@ Script load_script(const fs::path& path) {
     const auto j = ordered_json::parse(text, nullptr, true, true);
     if (j.at("osteotome_strokes") != 1) throw Error(ExitCode::usage, name + ": \"osteotome_strokes\" must be 1");
     where = "burr";
-    script.tool = burr_index(j.at("burr").at("kind"), j.at("burr").at("diameter_mm"));
+    BurrKind kind = BurrKind::cutting;
+    detail::FieldCollector fields;
+    fields({"burr.kind", "kind of burr"}, kind);
+    fields.fields.front().from_text(j.at("burr").at("kind").get<std::string>());
+    script.tool = burr_index(kind, j.at("burr").at("diameter_mm"));
     where = "axis";
     script.axis = normalized(point_of(j.at("axis")));
     if (length(script.axis) == 0) throw Error(ExitCode::usage, name + ": the axis has no length");
@@ -47,7 +51,7 @@ std::string script_json(const Script& script) {
   const Burr& burr = burr_library()[static_cast<std::size_t>(script.tool)];
   ordered_json j;
   j["osteotome_strokes"] = 1;
-  j["burr"] = {{"kind", burr.kind == BurrKind::cutting ? "cutting" : "diamond"}, {"diameter_mm", burr.diameter_mm}};
+  j["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(burr.kind)]}, {"diameter_mm", burr.diameter_mm}};
   j["axis"] = {script.axis.x, script.axis.y, script.axis.z};
   j["waypoints"] = ordered_json::array();
   for (const auto& w : script.waypoints)

@@ -48,9 +48,7 @@ void CutsPanel::draw(const Rehearsal& rehearsal, int tool, Box box) {
   // What is left of the bone, in the grey of its CT value where the case has it.
   const BrickGrid& bone = rehearsal.bone();
   const GreyAt grey = [&](Vec3 at) {
-    const Vec3 i = bone.frame().index_from_world(at);
-    const auto nearest = [](double x) { return static_cast<int>(std::floor(x + 0.5)); };
-    const double density = static_cast<double>(bone.at(nearest(i.x), nearest(i.y), nearest(i.z)));
+    const double density = static_cast<double>(bone.nearest(at));
     if (density <= 0) return 0.0;
     return density * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(at)))) : 220.0);
   };

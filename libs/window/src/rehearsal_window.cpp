@@ -213,10 +213,7 @@ class RehearsalWindow {
     const BrickGrid& bone = actions_.rehearsal().bone();
     const double far = length(centre_ - from) + 2 * radius_, step = bone.frame().spacing_mm.x / 2;
     for (double s = std::max(0.0, length(centre_ - from) - 2 * radius_); s < far; s += step) {
-      const Vec3 i = bone.frame().index_from_world(from + ray * s);
-      if (bone.at(static_cast<int>(std::floor(i.x + 0.5)), static_cast<int>(std::floor(i.y + 0.5)),
-                  static_cast<int>(std::floor(i.z + 0.5))) >= 0.5F)
-        return from + ray * s;
+      if (bone.nearest(from + ray * s) >= 0.5F) return from + ray * s;
     }
     return std::nullopt;
   }

@@ -99,7 +99,7 @@ TEST(SessionFile, IsNeverOverwritten) {
 
 TEST(Script, RoundTripAndErrorsSayWhere) {
   Script s;
-  s.tool = burr_index("diamond", 3);
+  s.tool = burr_index(BurrKind::diamond, 3);
   s.axis = {0, 0.6, 0.8};
   s.waypoints = {{0, {1, 2, 3}, false}, {1.5, {4, 5, 6}, true}};
   const auto path = fresh("strokes.json");

@@ -5,11 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "osteo/base/param.h"
 #include "osteo/data/vec.h"
 
 namespace osteo {
 
-enum class BurrKind : std::uint8_t { cutting, diamond };
+enum class BurrKind : int { cutting, diamond };
+template <>
+struct EnumNames<BurrKind> {
+  static constexpr std::array<std::string_view, 2> values{"cutting", "diamond"};
+};
 
 /// Removal of a sample at latitude L (angle from the equator seen along the burr's axis):
 ///   rate = force * max(0, rate_mm3_per_s_per_n - falloff * |L|)   (D. Morris 2006, section 3.2.3.6)
@@ -26,7 +31,7 @@ struct Burr {
 /// The library: cutting and diamond, 1 to 7 mm. A tool is named by its index here, also in session files.
 [[nodiscard]] const std::vector<Burr>& burr_library();
 /// Error(usage) when there is none.
-[[nodiscard]] int burr_index(const std::string& kind, double diameter_mm);
+[[nodiscard]] int burr_index(BurrKind kind, double diameter_mm);
 /// Changes whenever the library does: stored in session files, since indices would mean other burrs.
 inline constexpr int kBurrLibraryVersion = 1;
 

@@ -65,6 +65,12 @@ class BrickGrid {
     const VoxelKey key = find(i, j, k);
     return key == kNone ? 0.0F : value(key);
   }
+  /// The value of the voxel that holds a point of the world.
+  [[nodiscard]] float nearest(Vec3 world_mm) const {
+    const Vec3 x = frame_.index_from_world(world_mm);
+    const auto round = [](double v) { return static_cast<int>(std::floor(v + 0.5)); };
+    return at(round(x.x), round(x.y), round(x.z));
+  }
   void set(VoxelKey key, float v) { std::atomic_ref<float>(values_[key]).store(v, std::memory_order_relaxed); }
 
   /// Copies the block of voxels [lo, lo + n) into `out`, x fastest; voxels that are not stored are 0.
