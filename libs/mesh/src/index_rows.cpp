@@ -2,24 +2,19 @@
 
 namespace osteo {
 
-IndexRows rows_from_pairs(std::size_t rows, const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
-  IndexRows result;
-  result.first.assign(rows + 1, 0);
-  for (const auto& p : pairs) ++result.first[p.first + 1];
-  for (std::size_t r = 0; r < rows; ++r) result.first[r + 1] += result.first[r];
-  result.items.resize(pairs.size());
-  std::vector<std::uint32_t> fill(result.first.begin(), result.first.end() - 1);
-  for (const auto& p : pairs) result.items[fill[p.first]++] = p.second;
-  return result;
-}
-
 IndexRows triangles_of_vertices(const TriMesh& mesh) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  pairs.reserve(mesh.triangles.size() * 3);
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const auto v : mesh.triangles[t]) pairs.emplace_back(v, t);
+  IndexRows rows;
+  rows.first.assign(mesh.points_mm.size() + 1, 0);
+  for (const auto& t : mesh.triangles) {
+    for (const auto v : t) ++rows.first[v + 1];
   }
-  return rows_from_pairs(mesh.points_mm.size(), pairs);
+  for (std::size_t r = 0; r < mesh.points_mm.size(); ++r) rows.first[r + 1] += rows.first[r];
+  rows.items.resize(mesh.triangles.size() * 3);
+  std::vector<std::uint32_t> fill(rows.first.begin(), rows.first.end() - 1);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const auto v : mesh.triangles[t]) rows.items[fill[v]++] = t;
+  }
+  return rows;
 }
 
 }  // namespace osteo

@@ -4,8 +4,7 @@
 
 namespace osteo {
 
-/// Groups pairs (row, item) by row, in the order given.
-[[nodiscard]] IndexRows rows_from_pairs(std::size_t rows, const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs);
+/// One row a point: its triangles, ascending.
 [[nodiscard]] IndexRows triangles_of_vertices(const TriMesh& mesh);
 
 }  // namespace osteo

@@ -322,7 +322,17 @@ BoneSurface join_patches(const BrickGrid& bone, std::span<const SurfacePatch> pa
   const Frame& frame = bone.frame();
   std::unordered_map<std::uint64_t, std::uint32_t> shared;  // vertices in cells on the border between bricks
   std::vector<std::uint32_t> global;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> voxel_vertices;
+  std::vector<std::uint32_t> own;
+  result.vertices_of_voxel.first.push_back(0);
+  std::size_t vertices = 0, triangles = 0;
+  for (const SurfacePatch& patch : patches) {
+    vertices += patch.vertices.size();
+    triangles += patch.triangles.size();
+  }
+  result.mesh.points_mm.reserve(vertices);
+  result.mesh.normals.reserve(vertices);
+  result.mesh.triangles.reserve(triangles);
+  shared.reserve(vertices / 2);
   for (std::uint32_t b = 0; b < patches.size(); ++b) {
     const SurfacePatch& patch = patches[b];
     global.resize(patch.vertices.size());
@@ -347,21 +357,23 @@ BoneSurface join_patches(const BrickGrid& bone, std::span<const SurfacePatch> pa
     }
     // A left-handed frame turns triangles over: turn them back.
     const bool mirrored = determinant(frame.direction) < 0;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> local;
-    for (std::size_t t = 0; t < patch.triangles.size(); ++t) {
-      auto tri = patch.triangles[t];
-      if (mirrored) std::swap(tri[1], tri[2]);
-      result.mesh.triangles.push_back({global[tri[0]], global[tri[1]], global[tri[2]]});
-      for (const auto v : tri) local.emplace_back(b * BrickGrid::kVoxels + patch.voxel_of_triangle[t], global[v]);
-    }
-    std::sort(local.begin(), local.end());
-    local.erase(std::unique(local.begin(), local.end()), local.end());
-    for (const auto& [voxel, vertex] : local) {
-      if (result.voxels.empty() || result.voxels.back() != voxel) result.voxels.push_back(voxel);
-      voxel_vertices.emplace_back(static_cast<std::uint32_t>(result.voxels.size() - 1), vertex);
+    // A patch lists its triangles voxel by voxel: the vertices of a voxel are those of one run of triangles.
+    for (std::size_t t = 0; t < patch.triangles.size();) {
+      const std::uint16_t voxel = patch.voxel_of_triangle[t];
+      own.clear();
+      for (; t < patch.triangles.size() && patch.voxel_of_triangle[t] == voxel; ++t) {
+        auto tri = patch.triangles[t];
+        if (mirrored) std::swap(tri[1], tri[2]);
+        result.mesh.triangles.push_back({global[tri[0]], global[tri[1]], global[tri[2]]});
+        for (const auto v : tri) own.push_back(global[v]);
+      }
+      std::sort(own.begin(), own.end());
+      own.erase(std::unique(own.begin(), own.end()), own.end());
+      result.voxels.push_back(b * BrickGrid::kVoxels + voxel);
+      result.vertices_of_voxel.items.insert(result.vertices_of_voxel.items.end(), own.begin(), own.end());
+      result.vertices_of_voxel.first.push_back(static_cast<std::uint32_t>(result.vertices_of_voxel.items.size()));
     }
   }
-  result.vertices_of_voxel = rows_from_pairs(result.voxels.size(), voxel_vertices);
   result.triangles_of_vertex = triangles_of_vertices(result.mesh);
   return result;
 }
