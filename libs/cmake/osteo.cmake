@@ -16,6 +16,10 @@ endif()
 
 # -ffp-contract=off: the same bits with and without FMA, so that a session replays bit for bit on another machine.
 add_compile_options(-Wall -Wextra -Wconversion -Wno-sign-conversion -Wshadow -ffp-contract=off -fdiagnostics-color=auto)
+# False alarms of g++ 12 inside libstdc++ and nlohmann/json.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  add_compile_options(-Wno-restrict -Wno-stringop-overflow -Wno-maybe-uninitialized)
+endif()
 if(OSTEO_WERROR)
   add_compile_options(-Werror)
 endif()

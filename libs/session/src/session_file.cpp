@@ -73,9 +73,10 @@ SessionWriter::~SessionWriter() {
 
 void SessionWriter::frame(std::uint32_t type, std::span<const std::byte> payload) {
   const FrameHead head{kMagic, type, static_cast<std::uint32_t>(payload.size()), checksum(type, payload)};
-  std::vector<std::byte> all(sizeof head + payload.size());
-  std::memcpy(all.data(), &head, sizeof head);
-  std::memcpy(all.data() + sizeof head, payload.data(), payload.size());
+  // One write a frame, so that a frame is rarely cut in two.
+  const auto head_bytes = std::as_bytes(std::span(&head, 1));
+  std::vector<std::byte> all(head_bytes.begin(), head_bytes.end());
+  all.insert(all.end(), payload.begin(), payload.end());
   std::size_t done = 0;
   while (done < all.size()) {
     const ssize_t n = ::write(fd_, all.data() + done, all.size() - done);
