@@ -190,10 +190,6 @@ Tissue phantom_tissue(Vec3 p) {
   return airway ? Tissue::air : Tissue::soft;
 }
 
-PhantomEntry phantom_left_mastoid() {
-  return {{kMastoid.x + kMastoidRadii.x, kMastoid.y, kMastoid.z}, {-1, 0, 0}};
-}
-
 Phantom make_phantom(const PhantomParams& p, const Context& context) {
   const Frame frame = phantom_frame(p);
   if (static_cast<double>(frame.voxel_count()) > 1e9) {

@@ -30,12 +30,6 @@ inline constexpr int kTissueCount = 9;
 /// The exact tissue at a point; the head's centre is the origin. O(1), about 0.1 us.
 [[nodiscard]] Tissue phantom_tissue(Vec3 lps_mm);
 
-/// A point on the outside of the left mastoid and the inward direction there: where a mastoidectomy begins.
-struct PhantomEntry {
-  Vec3 point_mm, inward;
-};
-[[nodiscard]] PhantomEntry phantom_left_mastoid();
-
 enum class PhantomRegion : int { head, temporal };
 template <>
 struct EnumNames<PhantomRegion> {
