@@ -160,20 +160,12 @@ class Resampler {
   [[nodiscard]] float hu_at(Ijk brick, std::uint32_t voxel) const {
     const int v[3] = {brick.i * 8 + static_cast<int>(voxel & 7), brick.j * 8 + static_cast<int>(voxel >> 3 & 7),
                       brick.k * 8 + static_cast<int>(voxel >> 6)};
-    double x[3];
-    int lo[3];
+    Vec3 index;
     for (std::size_t a = 0; a < 3; ++a) {
       const double spacing = ct_.frame.spacing_mm[a];
-      const double c = std::clamp((-0.5 * spacing + (v[a] + 0.5) * h_) / spacing, 0.0, ct_.frame.dims[a] - 1.0);
-      lo[a] = std::min(static_cast<int>(c), std::max(0, ct_.frame.dims[a] - 2));
-      x[a] = c - lo[a];
+      index[a] = (-0.5 * spacing + (v[a] + 0.5) * h_) / spacing;
     }
-    double sum = 0;
-    for (int c = 0; c < 8; ++c) {
-      const double w = ((c & 1) != 0 ? x[0] : 1 - x[0]) * ((c & 2) != 0 ? x[1] : 1 - x[1]) * ((c & 4) != 0 ? x[2] : 1 - x[2]);
-      if (w > 0) sum += w * ct_.at(lo[0] + (c & 1), lo[1] + (c >> 1 & 1), lo[2] + (c >> 2));
-    }
-    return static_cast<float>(std::floor(sum + 0.5));
+    return static_cast<float>(std::floor(sample_linear(ct_, index) + 0.5));
   }
 
  private:

@@ -45,6 +45,16 @@ io::RawVolume load_raw(const fs::path& path, const Context& context) {
   return format->read(path, context);
 }
 
+// Errors of a conversion name the file.
+template <class F>
+auto in_file(const fs::path& path, F&& convert) {
+  try {
+    return convert();
+  } catch (const Error& e) {
+    throw e.in("'" + path.string() + "'");
+  }
+}
+
 template <class T>
 void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path) {
   const Format* const format = format_of(path);
@@ -60,23 +70,16 @@ bool is_volume_file(const fs::path& path) {
   return format_of(path) != nullptr;
 }
 Image load_image(const fs::path& path, const Context& context) {
-  const auto raw = load_raw(path, context);
-  try {
-    return io::image_from(raw, context);
-  } catch (const Error& e) {
-    throw e.in("'" + path.string() + "'");
-  }
+  return in_file(path, [&, raw = load_raw(path, context)] { return io::image_from(raw, context); });
 }
 Labels load_labels(const fs::path& path, const Context& context) {
-  const auto raw = load_raw(path, context);
-  try {
-    return io::labels_from(raw);
-  } catch (const Error& e) {
-    throw e.in("'" + path.string() + "'");
-  }
+  return in_file(path, [raw = load_raw(path, context)] { return io::labels_from(raw); });
 }
-bool holds_labels(const fs::path& path, const Context& context) {
-  return load_raw(path, context).type == io::Scalar::u8;
+std::variant<Image, Labels> load_volume(const fs::path& path, const Context& context) {
+  return in_file(path, [&, raw = load_raw(path, context)]() -> std::variant<Image, Labels> {
+    if (raw.type == io::Scalar::u8) return io::labels_from(raw);
+    return io::image_from(raw, context);
+  });
 }
 void save_image(const Image& image, const fs::path& path) {
   save_volume(image, io::Scalar::i16, path);

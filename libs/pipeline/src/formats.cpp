@@ -69,8 +69,7 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
     throw Error(ExitCode::usage, "'" + path.string() + "' is no " + kinds_text(accepted) + " by its name");
   }
   if (image && labels) {
-    if (holds_labels(path, context)) return load_labels(path, context);
-    return load_image(path, context);
+    return std::visit([](auto&& volume) -> Data { return volume; }, load_volume(path, context));
   }
   if (labels) return load_labels(path, context);
   return load_image(path, context);

@@ -24,22 +24,12 @@
 namespace osteo {
 namespace {
 
-double sample_linear(const Image& image, Vec3 world) {
+double hu_at(const Image& image, Vec3 world) {
   const Vec3 x = image.frame.index_from_world(world);
-  int lo[3];
-  double t[3];
   for (std::size_t a = 0; a < 3; ++a) {
     if (x[a] < -0.5 || x[a] > image.frame.dims[a] - 0.5) return -1024;
-    const double c = std::clamp(x[a], 0.0, image.frame.dims[a] - 1.0);
-    lo[a] = std::min(static_cast<int>(c), std::max(0, image.frame.dims[a] - 2));
-    t[a] = c - lo[a];
   }
-  double sum = 0;
-  for (int c = 0; c < 8; ++c) {
-    const double w = ((c & 1) != 0 ? t[0] : 1 - t[0]) * ((c & 2) != 0 ? t[1] : 1 - t[1]) * ((c & 4) != 0 ? t[2] : 1 - t[2]);
-    if (w > 0) sum += w * image.at(lo[0] + (c & 1), lo[1] + (c >> 1 & 1), lo[2] + (c >> 2));
-  }
-  return sum;
+  return sample_linear(image, x);
 }
 
 int sample_label(const Labels& labels, Vec3 world) {
@@ -53,7 +43,7 @@ int sample_label(const Labels& labels, Vec3 world) {
 }
 
 GreyAt grey_of(const Data& data) {
-  if (const auto* image = std::get_if<Image>(&data)) return [image](Vec3 p) { return grey_of_hu(sample_linear(*image, p)); };
+  if (const auto* image = std::get_if<Image>(&data)) return [image](Vec3 p) { return grey_of_hu(hu_at(*image, p)); };
   if (const auto* grid = std::get_if<SparseGrid>(&data)) {
     auto sampler = std::make_shared<GridSampler>(*grid);
     if (grid->name == "hu") return [sampler](Vec3 p) { return grey_of_hu(static_cast<double>(sampler->nearest(p))); };

@@ -27,6 +27,9 @@ using Image = Volume<std::int16_t>;
 /// 0 is background; a mask has only 1 besides; a label map has one value a structure.
 using Labels = Volume<std::uint8_t>;
 
+/// Trilinear between voxel centres at a point in index coordinates; outside, the value at the border.
+[[nodiscard]] double sample_linear(const Image& image, Vec3 index);
+
 /// Uninitialised voxels to fill before they become a Volume.
 template <class T>
 [[nodiscard]] std::shared_ptr<T[]> make_voxels(std::size_t count) {

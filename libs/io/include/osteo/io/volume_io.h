@@ -1,6 +1,7 @@
 // CT volumes and label maps in the formats of the field: NRRD, NIfTI, MetaImage, VTI.
 #pragma once
 #include <filesystem>
+#include <variant>
 
 #include "osteo/base/context.h"
 #include "osteo/data/volume.h"
@@ -15,8 +16,8 @@ namespace osteo {
 [[nodiscard]] Image load_image(const std::filesystem::path& path, const Context& context = {});
 /// The same for values that are whole numbers from 0 to 255.
 [[nodiscard]] Labels load_labels(const std::filesystem::path& path, const Context& context = {});
-/// True when the file's scalars are 8-bit unsigned: then it is taken for labels where both are accepted.
-[[nodiscard]] bool holds_labels(const std::filesystem::path& path, const Context& context = {});
+/// Where both are accepted: labels when the file's scalars are 8-bit unsigned, else an image.
+[[nodiscard]] std::variant<Image, Labels> load_volume(const std::filesystem::path& path, const Context& context = {});
 
 /// By suffix, written atomically. Same volume, same bytes. Errors: usage for an unknown suffix, cannot_write.
 void save_image(const Image& image, const std::filesystem::path& path);
