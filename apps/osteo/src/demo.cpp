@@ -42,7 +42,8 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
 
   say("drilling for " + format_number(p.seconds) + " s");
   const fs::path session = out / "session";
-  fs::remove_all(session);
+  // Only what an earlier demo left is replaced; another folder of this name is refused below, as by rehearse.
+  if (fs::exists(session / "session.json")) fs::remove_all(session);
   RehearseCommand::Params rehearse;
   rehearse.headless = true;
   rehearse.out = session.string();
