@@ -15,7 +15,7 @@ _osteo() {
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
   case "${COMP_WORDS[1]}" in
-    import) flags="$flags --xml --describe --series --max-gap-mm --axes" ;;
+    import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --axes --verdict-out" ;;
     threshold) flags="$flags --xml --describe --lower --upper --core --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;

@@ -8,7 +8,10 @@ find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecut
   FiltersCore FiltersSources FiltersGeneral IOImage IOXML IOPLY IOGeometry IOCore CommonMisc ImagingCore RenderingCore RenderingOpenGL2
   RenderingFreeType glew metaio)
 find_package(DICOM REQUIRED)
+find_package(GDCM REQUIRED)
 find_package(PkgConfig REQUIRED)
+pkg_check_modules(LIBARCHIVE REQUIRED IMPORTED_TARGET libarchive)
+find_package(DCMTK CONFIG REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 list(APPEND CMAKE_MODULE_PATH ${CMAKE_SYSTEM_PREFIX_PATH})
 # Debian keeps OpenVDB's find module below the library folder.

@@ -5,7 +5,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/image/phantom.h"
-#include "osteo/io/dicom.h"
+#include "osteo/dicom/save_series.h"
 
 namespace osteo {
 

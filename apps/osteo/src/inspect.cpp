@@ -8,7 +8,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/grid/brick_grid.h"
-#include "osteo/io/dicom.h"
+#include "osteo/dicom/scan.h"
 #include "osteo/pipeline/formats.h"
 
 namespace osteo {
@@ -155,36 +155,54 @@ cli::CommandInfo SeriesCommand::info() {
 
 int SeriesCommand::run(const Params&, cli::Invocation& io) {
   if (io.arguments.size() != 1) throw Error(ExitCode::usage, "which folder? osteo import --list FOLDER");
-  const auto all = scan_dicom(io.arguments[0], io.context);
+  const DicomScan scan = scan_dicom(io.arguments[0], {}, io.context);
   io.end_progress();
   if (io.common.json) {
-    ordered_json list = ordered_json::array();
-    for (const DicomSeries& s : all) {
-      list.push_back({{"number", s.number},
-                      {"uid", s.uid},
-                      {"modality", s.modality},
-                      {"what", s.what},
-                      {"usable", s.usable},
-                      {"recommended", s.recommended},
-                      {"images", s.images},
-                      {"columns", s.columns},
-                      {"rows", s.rows},
-                      {"pixel_mm", s.pixel_mm},
-                      {"thickness_mm", s.thickness_mm},
-                      {"kernel", s.kernel},
-                      {"description", s.description}});
+    ordered_json j;
+    j["files"] = scan.files;
+    j["series"] = ordered_json::array();
+    for (const DicomSeries& s : scan.series) {
+      ordered_json e{{"number", s.number},
+                     {"uid", s.uid},
+                     {"modality", s.modality},
+                     {"what", s.what},
+                     {"usable", s.usable},
+                     {"recommended", s.recommended},
+                     {"images", s.images},
+                     {"columns", s.columns},
+                     {"rows", s.rows},
+                     {"pixel_mm", s.pixel_mm},
+                     {"thickness_mm", s.thickness_mm},
+                     {"gap_mm", s.gap_mm},
+                     {"kernel", s.kernel},
+                     {"description", s.description}};
+      if (s.usable) e["why"] = s.why;
+      if (!s.problem.empty()) e["problem"] = s.problem;
+      j["series"].push_back(std::move(e));
     }
-    io.out << list.dump(2) << '\n';
+    j["set_aside"] = ordered_json::array();
+    for (const FileSetAside& f : scan.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
+    io.out << j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
     return 0;
   }
-  io.out << "  series  images  size       pixel mm  slice mm  what               kernel    description\n";
-  for (const DicomSeries& s : all) {
-    char line[256];
+  io.out << "  series  images  size       pixel mm  gap mm    what                          kernel    description\n";
+  for (const DicomSeries& s : scan.series) {
+    char line[320];
     const std::string size = std::to_string(s.columns) + "x" + std::to_string(s.rows);
-    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-18s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images,
-                  size.c_str(), s.pixel_mm, s.thickness_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
+    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-29s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images,
+                  size.c_str(), s.pixel_mm, s.gap_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
     io.out << line;
   }
+  for (const DicomSeries& s : scan.series) {
+    if (s.recommended) io.out << "* recommended: " << s.why << '\n';
+    if (!s.problem.empty()) io.out << "  " << s.number << ": " << s.problem << '\n';
+  }
+  if (!scan.set_aside.empty()) io.out << "set aside, " << scan.set_aside.size() << " of " << scan.files << " files:\n";
+  constexpr std::size_t kShown = 10;
+  for (std::size_t i = 0; i < std::min(kShown, scan.set_aside.size()); ++i) {
+    io.out << "  " << scan.set_aside[i].file << ": " << scan.set_aside[i].why << '\n';
+  }
+  if (scan.set_aside.size() > kShown) io.out << "  and " << scan.set_aside.size() - kShown << " more (--json lists them all)\n";
   return 0;
 }
 

@@ -2,7 +2,7 @@
 #include "osteo/grid/resample.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
-#include "osteo/io/import.h"
+#include "osteo/dicom/import.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/view/snapshot.h"
 

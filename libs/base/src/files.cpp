@@ -86,6 +86,22 @@ void prepare_parent(const fs::path& path) {
 
 }  // namespace
 
+TemporaryFolder::TemporaryFolder() {
+  std::error_code ec;
+  std::string pattern = (fs::temp_directory_path(ec) / "osteo-XXXXXX").string();
+  if (ec || ::mkdtemp(pattern.data()) == nullptr) throw_write_error(pattern, ec ? ec.value() : errno);
+  path_ = pattern;
+  const std::lock_guard lock(g_temporaries_mutex);
+  temporaries().insert(path_);
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+  const std::lock_guard lock(g_temporaries_mutex);
+  temporaries().erase(path_);
+}
+
 void require_readable(const fs::path& path) {
   std::error_code ec;
   const auto status = fs::status(path, ec);

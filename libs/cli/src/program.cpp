@@ -143,6 +143,10 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
       node.outputs[p.name] = parsed.positionals[next++];
     } else if (const auto it = parsed.files.find(p.name + "-out"); it != parsed.files.end()) {
       node.outputs[p.name] = it->second;
+    } else if (!p.beside.empty()) {
+      fs::path first = node.outputs[info.outputs.front().name];
+      if (first.filename().empty()) first = first.parent_path();
+      node.outputs[p.name] = first += p.beside;
     }
   }
   for (const FieldRef& f : stage.fields()) node.params[std::string(f.doc.name)] = f.to_text();

@@ -63,7 +63,7 @@ void write_with(Writer* writer, vtkPolyData* data, const fs::path& path) {
     const QuietVtk quiet;
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(data);
-    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw io::write_error(path, writer->GetErrorCode());
+    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
   });
 }
 

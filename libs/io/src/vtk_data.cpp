@@ -2,6 +2,7 @@
 
 #include <vtkCellArray.h>
 #include <vtkCellArrayIterator.h>
+#include <vtkErrorCode.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
@@ -75,6 +76,12 @@ class Collector : public vtkOutputWindow {
 vtkStandardNewMacro(Collector);
 
 }  // namespace
+
+Error vtk_write_error(const std::filesystem::path& path, unsigned long vtk_error_code) {
+  const bool full = vtk_error_code == vtkErrorCode::OutOfDiskSpaceError;
+  return {ExitCode::cannot_write, "cannot write '" + path.string() + "'" + (full ? ": No space left on device" : ""),
+          "see that the disk has room and the folder may be written"};
+}
 
 vtkSmartPointer<vtkImageData> to_vtk(const Image& image) {
   return wrap<vtkShortArray>(image, "HU");

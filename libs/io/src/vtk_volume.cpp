@@ -91,12 +91,6 @@ void frame_from_ras(Frame& frame, const vtkMatrix4x4* m, Vec3 spacing) {
 
 }  // namespace
 
-Error write_error(const fs::path& path, unsigned long vtk_error_code) {
-  const bool full = vtk_error_code == vtkErrorCode::OutOfDiskSpaceError;
-  return {ExitCode::cannot_write, "cannot write '" + path.string() + "'" + (full ? ": No space left on device" : ""),
-          "see that the disk has room and the folder may be written"};
-}
-
 void set_frame(vtkImageData* image, const Frame& f) {
   image->SetDimensions(f.dims[0], f.dims[1], f.dims[2]);
   image->SetSpacing(f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z);
@@ -154,7 +148,7 @@ void write_vti(const RawVolume& raw, const fs::path& path) {
     vtkNew<vtkXMLImageDataWriter> writer;
     writer->SetFileName(temporary.c_str());
     writer->SetInputData(vtk_view(raw));
-    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw write_error(path, writer->GetErrorCode());
+    if (writer->Write() == 0 || writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
   });
 }
 
@@ -239,7 +233,7 @@ void write_nifti(const RawVolume& given, const fs::path& path) {
     writer->SetSFormMatrix(ras);
     writer->SetDescription("Osteotome");
     writer->Write();
-    if (writer->GetErrorCode() != 0) throw write_error(path, writer->GetErrorCode());
+    if (writer->GetErrorCode() != 0) throw vtk_write_error(path, writer->GetErrorCode());
   });
 }
 
@@ -385,11 +379,11 @@ void write_meta(const RawVolume& raw, const fs::path& path) {
     meta.BinaryData(true);
     meta.SetDoublePrecision(17);
     const QuietCerr quiet;
-    if (!meta.Write(temporary.c_str(), "LOCAL")) throw write_error(path, 0);
+    if (!meta.Write(temporary.c_str(), "LOCAL")) throw vtk_write_error(path, 0);
     try {
       require_whole_meta(temporary);  // MetaIO does not look whether its bytes arrived
     } catch (const Error&) {
-      throw write_error(path, vtkErrorCode::OutOfDiskSpaceError);
+      throw vtk_write_error(path, vtkErrorCode::OutOfDiskSpaceError);
     }
   });
 }

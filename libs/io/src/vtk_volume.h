@@ -9,9 +9,6 @@ class vtkImageData;
 
 namespace osteo::io {
 
-/// What to throw when a VTK writer failed: says "no space left" when that was it.
-[[nodiscard]] Error write_error(const std::filesystem::path& path, unsigned long vtk_error_code);
-
 void set_frame(vtkImageData* image, const Frame& frame);
 /// Shares the scalars.
 [[nodiscard]] RawVolume raw_from_vtk(vtkImageData* image);

@@ -5,8 +5,8 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/dicom/save_series.h"
 #include "osteo/grid/grid_io.h"
-#include "osteo/io/dicom.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/stage/stage.h"
@@ -18,11 +18,12 @@ struct Suffixes {
   DataKind kind;
   std::string_view writable;
 };
-constexpr std::array<Suffixes, 5> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
+constexpr std::array<Suffixes, 6> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
                                              {DataKind::labels, ".nrrd .nii .nii.gz .mha .vti"},
                                              {DataKind::grid, ".vdb"},
                                              {DataKind::surface, ".ply .stl .obj .vtp"},
-                                             {DataKind::picture, ".png"}}};
+                                             {DataKind::picture, ".png"},
+                                             {DataKind::document, ".json"}}};
 
 bool accepts(std::span<const DataKind> kinds, DataKind kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
@@ -112,6 +113,9 @@ void save_data(const Data& data, const fs::path& path, const Context& context) {
       return;
     case DataKind::picture:
       save_picture(std::get<Picture>(data), path);
+      return;
+    case DataKind::document:
+      write_file(path, std::get<Document>(data).json);
       return;
     case DataKind::none:
     case DataKind::source:

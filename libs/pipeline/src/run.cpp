@@ -202,6 +202,10 @@ class Runner {
         const auto it = node.outputs.find(info.outputs[p].name);
         if (it != node.outputs.end()) save_output(n, info.outputs[p].name, values_[n][p], it->second, context);
       }
+    } catch (const ErrorWithDocument& e) {
+      const auto it = node.outputs.find(e.port());
+      if (it != node.outputs.end()) save_data(e.document(), it->second, context);
+      throw pipeline_.nodes.size() == 1 ? static_cast<const Error&>(e) : e.in("stage '" + node.id + "'");
     } catch (const Error& e) {
       if (e.code() == ExitCode::cancelled || pipeline_.nodes.size() == 1) throw;
       throw e.in("stage '" + node.id + "'");

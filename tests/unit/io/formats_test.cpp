@@ -6,8 +6,6 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/image/phantom.h"
-#include "osteo/io/dicom.h"
-#include "osteo/io/import.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/io/volume_io.h"
 
@@ -140,110 +138,6 @@ TEST(Labels, CtIsNotTakenForLabels) {
   EXPECT_THROW(static_cast<void>(load_labels(path)), Error);
 }
 
-TEST(Dicom, SeriesComesBackToTheVoxel) {
-  const auto path = folder() / "series";
-  const Image image = oblique(false);
-  save_dicom_series(image, path);
-  const auto series = scan_dicom(path);
-  ASSERT_EQ(series.size(), 1u);
-  EXPECT_TRUE(series[0].recommended);
-  const Image back = load_dicom_series(series[0], 8);
-  expect_same_world(image, back);
-}
-
-TEST(Dicom, LeftHandedVolumeKeepsItsPlace) {
-  const auto path = folder() / "series-left-handed";
-  const Image image = oblique(true);
-  save_dicom_series(image, path);
-  expect_same_world(image, load_dicom_series(scan_dicom(path)[0], 8));
-}
-
-TEST(Dicom, MissingSliceIsInterpolatedOrRefused) {
-  PhantomParams p;
-  p.region = PhantomRegion::temporal;
-  p.spacing_mm = 2;
-  const auto path = folder() / "gap";
-  const Image ct = make_phantom(p).ct;
-  save_dicom_series(ct, path);
-  std::vector<fs::path> files(fs::directory_iterator(path), {});
-  std::sort(files.begin(), files.end());
-  fs::remove(files[10]);
-  const auto series = scan_dicom(path)[0];
-  try {
-    static_cast<void>(load_dicom_series(series, 3));
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::failed);
-    EXPECT_NE(std::string(e.what()).find("gap of 4 mm"), std::string::npos) << e.what();
-  }
-  // Interpolated: every slice that is there keeps its place.
-  const Image back = load_dicom_series(series, 8);
-  double worst = 0;
-  for (int k = 0; k < ct.frame.dims[2]; ++k) {
-    if (k == 10) continue;
-    const Vec3 x = back.frame.index_from_world(ct.frame.world_from_index({20, 20, double(k)}));
-    const int z = static_cast<int>(std::lround(x.z));
-    if (std::abs(x.z - z) > 1e-3 || z >= back.frame.dims[2]) continue;
-    worst = std::max(worst, std::abs(double(back.at(20, 20, z)) - double(ct.at(20, 20, k))));
-  }
-  EXPECT_LE(worst, 1);
-}
-
-TEST(Dicom, DuplicateAndForeignSlicesAreRefusedByName) {
-  PhantomParams p;
-  p.region = PhantomRegion::temporal;
-  p.spacing_mm = 4;
-  const auto path = folder() / "dup";
-  save_dicom_series(make_phantom(p).ct, path);
-  auto series = scan_dicom(path)[0];
-  auto twice = series;
-  twice.files.push_back(series.files[3]);
-  EXPECT_THROW(static_cast<void>(load_dicom_series(twice, 8)), Error);
-  const auto other = folder() / "other";
-  p.spacing_mm = 3;
-  save_dicom_series(make_phantom(p).ct, other);
-  series.files.push_back(scan_dicom(other)[0].files[2]);
-  try {
-    static_cast<void>(load_dicom_series(series, 8));
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_NE(std::string(e.what()).find("pixels"), std::string::npos) << e.what();
-  }
-}
-
-TEST(Dicom, CutFileIsRefusedByName) {
-  PhantomParams p;
-  p.region = PhantomRegion::temporal;
-  p.spacing_mm = 4;
-  const auto path = folder() / "cutslice";
-  save_dicom_series(make_phantom(p).ct, path);
-  const auto series = scan_dicom(path)[0];
-  fs::resize_file(series.files[5], fs::file_size(series.files[5]) / 2);
-  try {
-    static_cast<void>(load_dicom_series(series, 8));
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::corrupt);
-    EXPECT_NE(std::string(e.what()).find(series.files[5].filename().string()), std::string::npos) << e.what();
-  }
-}
-
-TEST(Import, AxesOverrideTurnsAVolumeAboutItsCentre) {
-  const auto path = folder() / "axes.nrrd";
-  PhantomParams p;
-  p.region = PhantomRegion::temporal;
-  p.spacing_mm = 4;
-  const Image ct = make_phantom(p).ct;
-  save_image(ct, path);
-  ImportParams params;
-  params.axes = "LPI";
-  const Image turned = import_ct(path, params);
-  EXPECT_EQ(orientation_code(turned.frame), "LPI");
-  EXPECT_LT(length(turned.frame.centre_mm() - ct.frame.centre_mm()), 1e-9);
-  params.axes = "LLS";
-  EXPECT_THROW(static_cast<void>(import_ct(path, params)), Error);
-}
-
 TEST(Surface, FormatsKeepPointsAndTriangles) {
   TriMesh mesh;
   mesh.points_mm = {{-1.5F, 2, 3}, {4, 5.25F, 6}, {7, 8, 9.125F}, {0, 0, 1}};
@@ -254,36 +148,6 @@ TEST(Surface, FormatsKeepPointsAndTriangles) {
     const auto back = load_surface(path);
     EXPECT_EQ(back->triangles.size(), 2u) << suffix;
     EXPECT_NEAR(area_mm2(*back), area_mm2(mesh), 1e-4) << suffix;
-  }
-}
-
-// Real series: the position of every slice against its own header.
-TEST(RealDicom, TiltedUnevenHeadIsPlacedByPosition) {
-  const fs::path data = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_head_tilt_gaps";
-  if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
-  const Image image = import_ct(data, {});
-  EXPECT_EQ(image.frame.dims[0], 512);
-  EXPECT_GT(image.frame.dims[1], 600);  // the lean needs more rows than a slice has
-  EXPECT_NEAR(length(image.frame.world_from_index({0, 0, image.frame.dims[2] - 1.0}) - image.frame.origin_mm), 144.1, 1.0);
-}
-
-TEST(RealDicom, StraightPhantomSeriesIsTakenVoxelForVoxel) {
-  const fs::path data = fs::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom" / "S21570";
-  if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
-  const auto all = scan_dicom(data);
-  const auto best = std::find_if(all.begin(), all.end(), [](const auto& s) { return s.recommended; });
-  ASSERT_NE(best, all.end());
-  EXPECT_EQ(best->images, 140);
-  Context context;
-  const Image image = import_ct(data, {}, context);
-  EXPECT_EQ(image.frame.dims, (std::array<int, 3>{512, 512, 140}));
-  EXPECT_NEAR(image.frame.spacing_mm.x, 0.4512, 1e-4);
-  EXPECT_NEAR(image.frame.spacing_mm.z, 1.0, 1e-6);
-  const auto [lo, hi] = std::minmax_element(image.span().begin(), image.span().end());
-  EXPECT_EQ(*lo, -1024);
-  EXPECT_EQ(*hi, 3071);
-  for (const auto& s : all) {
-    EXPECT_EQ(s.usable && s.what == "localizer", false);
   }
 }
 

@@ -29,6 +29,19 @@ void write_file(const fs::path& path, std::string_view content);
 /// an empty folder, or as any folder when `replace` is true.
 void write_folder_atomically(const fs::path& path, bool replace, const std::function<void(const fs::path& temporary)>& fill);
 
+/// A folder of one's own among the system's temporary files, for this user only; gone with the object, and when the process is stopped.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
 /// Removes the temporaries of this process. Async-signal-unsafe: call it on the way out, not in a handler.
 void remove_temporaries() noexcept;
 

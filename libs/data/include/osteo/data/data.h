@@ -25,17 +25,22 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
+/// Findings in JSON, for programs as well as people.
+struct Document {
+  std::string json;
+};
+
 /// std::monostate stands for an optional input that was not given.
-using Data = std::variant<std::monostate, Source, Image, Labels, SparseGrid, Surface, Picture>;
+using Data = std::variant<std::monostate, Source, Image, Labels, SparseGrid, Surface, Picture, Document>;
 
 /// In the order of the alternatives of Data.
-enum class DataKind : int { none, source, image, labels, grid, surface, picture };
+enum class DataKind : int { none, source, image, labels, grid, surface, picture, document };
 
 [[nodiscard]] inline DataKind kind_of(const Data& data) {
   return static_cast<DataKind>(data.index());
 }
 [[nodiscard]] constexpr std::string_view kind_name(DataKind kind) {
-  constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture"};
+  constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture", "document"};
   return names[static_cast<int>(kind)];
 }
 

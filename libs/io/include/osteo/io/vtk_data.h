@@ -2,6 +2,9 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
+#include <filesystem>
+
+#include "osteo/base/error.h"
 #include "osteo/data/tri_mesh.h"
 #include "osteo/data/volume.h"
 
@@ -22,6 +25,9 @@ namespace osteo {
 [[nodiscard]] Labels labels_from_vtk(vtkImageData* data);
 /// Polygons of more than three points are refused (Error corrupt); strips and lines are ignored.
 [[nodiscard]] TriMesh mesh_from_vtk(vtkPolyData* data);
+
+/// What to throw when a VTK writer failed: says "no space left" when that was it.
+[[nodiscard]] Error vtk_write_error(const std::filesystem::path& path, unsigned long vtk_error_code);
 
 /// While it lives, VTK's warnings and errors are collected instead of printed.
 class QuietVtk {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "osteo/base/context.h"
+#include "osteo/base/error.h"
 #include "osteo/base/param.h"
 #include "osteo/data/data.h"
 
@@ -23,7 +24,8 @@ struct Port {
   std::string name;
   std::vector<DataKind> kinds;  ///< an input accepts any of these; an output is of the first
   std::string help;
-  bool optional = false;  ///< input: may be left out. Output: saved only when asked for
+  bool optional = false;    ///< input: may be left out. Output: saved only when asked for
+  std::string beside = {};  ///< output: on the command line saved beside the first output, with this added to its name
 };
 
 struct StageInfo {
@@ -34,6 +36,19 @@ struct StageInfo {
   std::vector<Port> inputs, outputs;
   std::vector<std::string> references;  ///< papers and sections that the method follows
   std::string example;                  ///< a command line that works
+};
+
+/// An Error of a stage that still has something to show: the runner saves it to the port, if that is wanted, and throws on.
+class ErrorWithDocument : public Error {
+ public:
+  ErrorWithDocument(const Error& error, std::string port, Document document)
+      : Error(error), port_(std::move(port)), document_(std::move(document)) {}
+  [[nodiscard]] const std::string& port() const { return port_; }
+  [[nodiscard]] const Document& document() const { return document_; }
+
+ private:
+  std::string port_;
+  Document document_;
 };
 
 /// A stage with its parameters. Not thread-safe; make one for each use.

@@ -1,0 +1,51 @@
+// What lies in a folder, some files, a DICOMDIR or an archive: each file's header read once, grouped into series.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "osteo/base/context.h"
+#include "osteo/base/files.h"
+#include "osteo/dicom/header.h"
+#include "osteo/dicom/place.h"
+
+namespace osteo {
+
+/// What a person needs to choose a series.
+struct DicomSeries {
+  int number = 0;   ///< SeriesNumber as the scanner gave it
+  std::string uid;  ///< to ask for it by; never written to a file
+  std::string modality, kernel;
+  std::string description;  ///< the scanner's free text, without what identifies the patient
+  int columns = 0, rows = 0, images = 0;
+  double pixel_mm = 0, thickness_mm = 0, gap_mm = 0;
+  std::string what;     ///< "axial, 140 slices", "localizer", "refused: GAP_TOO_WIDE", ...
+  std::string problem;  ///< the first error, as a sentence; empty when usable
+  bool usable = false;
+  bool recommended = false;  ///< taken when nothing is asked for
+  std::string why;           ///< why it is recommended
+  std::vector<DicomHeader> headers;
+};
+
+struct DicomScan {
+  std::vector<DicomSeries> series;      ///< by number
+  std::vector<FileSetAside> set_aside;  ///< files that belong to no series of pictures
+  std::size_t files = 0;
+  std::shared_ptr<TemporaryFolder> scratch;  ///< keeps unpacked and rewritten files until the pixels are read
+};
+
+/// `source`: a folder (any depth), a DICOM file (its series is all that is read beside it when it is a DICOMDIR), or an archive
+/// (zip, tar, 7z; unpacked into the system's temporary folder). Headers are read in parallel, each once, no pixels.
+/// Names shown hold no value that identifies the patient: such a folder becomes "*",
+/// such a file "file-000012".
+/// Errors: no_input when there is no DICOM image at all, cannot_read, resources when an archive does not fit the disk.
+[[nodiscard]] DicomScan scan_dicom(const std::filesystem::path& source, const PlaceOptions& options = {}, const Context& context = {});
+
+/// The recommended series, or the one asked for by number or UID. Errors: usage, no_input; both list what there is.
+[[nodiscard]] const DicomSeries& choose_series(const DicomScan& scan, const std::string& wanted, const std::string& source_name);
+
+/// True by name or by first bytes.
+[[nodiscard]] bool is_archive(const std::filesystem::path& file);
+
+}  // namespace osteo

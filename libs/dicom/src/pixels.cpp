@@ -1,0 +1,260 @@
+#include "pixels.h"
+
+#include <fcntl.h>
+#include <gdcmTrace.h>
+#include <unistd.h>
+#include <vtkDICOMReader.h>
+#include <vtkDataArray.h>
+#include <vtkErrorCode.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+namespace osteo::dicom {
+namespace {
+
+// Scanners mark what they did not measure with values that no tissue has; noise of air does not reach this far.
+constexpr double kPaddingBelowHu = -1200;
+// A padding tag that names a value above this names tissue.
+constexpr double kTissueFromHu = -900;
+constexpr std::int16_t kMetalHu = 3000;
+
+void read_bytes(const DicomHeader& h, std::uint64_t offset, void* out, std::size_t bytes) {
+  const int fd = ::open(h.file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) throw PixelError(std::string("it cannot be read: ") + std::strerror(errno));
+  std::size_t got = 0;
+  while (got < bytes) {
+    const ssize_t n = ::pread(fd, static_cast<char*>(out) + got, bytes - got, static_cast<off_t>(offset + got));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    got += static_cast<std::size_t>(n);
+  }
+  ::close(fd);
+  if (got < bytes)
+    throw PixelError("the file is cut short: " + std::to_string(got) + " of " + std::to_string(bytes) + " bytes of pixels are there");
+}
+
+// Keeps the bits of the pixel where others hold an overlay.
+template <class T>
+void remove_overlay(const DicomHeader& h, T* p, std::size_t n) {
+  if (!h.overlay_in_pixels || h.bits_stored <= 0 || h.bits_stored >= static_cast<int>(8 * sizeof(T)) || h.high_bit + 1 < h.bits_stored)
+    return;
+  const int shift = h.high_bit + 1 - h.bits_stored;
+  const unsigned mask = (1U << h.bits_stored) - 1, sign = 1U << (h.bits_stored - 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const unsigned v = (static_cast<unsigned>(static_cast<std::make_unsigned_t<T>>(p[i])) >> shift) & mask;
+    p[i] = static_cast<T>(h.is_signed && (v & sign) != 0 ? v | ~mask : v);
+  }
+}
+
+class Converter {
+ public:
+  Converter(const DicomHeader& h, const DicomFrame& f, ValueCount& count) : h_(h), f_(f), count_(count) {
+    count.fractional = count.fractional || f.slope != std::floor(f.slope) || f.intercept != std::floor(f.intercept);
+    if (h.padding) {
+      const int lo = h.padding_limit ? std::min(*h.padding, *h.padding_limit) : *h.padding;
+      const int hi = h.padding_limit ? std::max(*h.padding, *h.padding_limit) : *h.padding;
+      const bool is_tissue = hounsfield(hi, f) > kTissueFromHu;
+      (is_tissue ? tissue_lo_ : pad_lo_) = lo;
+      (is_tissue ? tissue_hi_ : pad_hi_) = hi;
+    }
+    const double top =
+        h.bits_stored > 0 && h.bits_stored < 16 ? (h.is_signed ? (1 << (h.bits_stored - 1)) - 1 : (1 << h.bits_stored) - 1) : 1e9;
+    top_ = h.bits_stored > 8 ? static_cast<std::int64_t>(top) : std::int64_t{1} << 40;
+  }
+
+  // `in` and `out` may be the same memory when T has two bytes.
+  template <class T>
+  void run(const T* in, std::int16_t* out, std::size_t columns, std::size_t rows) {
+    if (count_.histogram.empty()) count_.histogram.assign(ValueCount::kBins, 0);
+    for (std::size_t y = 0; y < rows; ++y) row(in + y * columns, out + y * columns, columns, y % 4 == 0);
+    count_.pixels += columns * rows;
+  }
+
+ private:
+  template <class T>
+  void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
+    std::int64_t lo = 1 << 30, hi = -(1 << 30);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t v = in[i];
+      lo = std::min(lo, v);
+      hi = std::max(hi, v);
+    }
+    const double low = hounsfield(static_cast<double>(lo), f_), high = hounsfield(static_cast<double>(hi), f_);
+    const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
+    const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
+    const bool tissue = tissue_lo_ <= tissue_hi_ && lo <= tissue_hi_ && hi >= tissue_lo_;
+    if (whole && !padded && !tissue && low >= kPaddingBelowHu && high <= 32767) {
+      const auto shift = static_cast<int>(f_.intercept);
+      for (std::size_t i = 0; i < n; ++i) {
+        const int v = static_cast<int>(in[i]) + shift;
+        out[i] = static_cast<std::int16_t>(v < kAirHu ? kAirHu : v);
+      }
+      count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
+    } else {
+      careful_row(in, out, n);
+    }
+    count_.hu_max = std::max(count_.hu_max, static_cast<std::int64_t>(std::floor(high + 0.5)));
+    if (hi >= top_) {
+      for (std::size_t i = 0; i < n; ++i)
+        count_.saturated += out[i] >= static_cast<std::int64_t>(std::floor(hounsfield(static_cast<double>(top_), f_))) ? 1 : 0;
+    }
+    if (high >= kMetalHu) {
+      for (std::size_t i = 0; i < n; ++i) count_.metal += out[i] >= kMetalHu ? 1 : 0;
+    }
+    if (!sample) return;
+    for (std::size_t i = 0; i < n; ++i) {
+      const int bin = (out[i] + 1200) >> 2;
+      // Air that the scanner cut off at -1024 is no peak of its own.
+      if (bin >= 0 && bin < ValueCount::kBins && out[i] > kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
+    }
+  }
+
+  template <class T>
+  void careful_row(const T* in, std::int16_t* out, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t stored = in[i];
+      const double hu = hounsfield(static_cast<double>(stored), f_);
+      if (stored >= pad_lo_ && stored <= pad_hi_) {
+        ++count_.by_tag;
+        count_.padding_hu = std::min(count_.padding_hu, hu);
+        out[i] = kNoValue;
+        continue;
+      }
+      if (stored >= tissue_lo_ && stored <= tissue_hi_) ++count_.declared_tissue;
+      if (hu < kPaddingBelowHu) {
+        ++count_.found;
+        count_.padding_hu = std::min(count_.padding_hu, hu);
+        out[i] = kNoValue;
+        continue;
+      }
+      if (hu > 32767) ++count_.out_of_range;
+      count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(std::floor(hu + 0.5)));
+      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(hu + 0.5), static_cast<double>(kAirHu), 32767.0));
+    }
+  }
+
+  const DicomHeader& h_;
+  const DicomFrame& f_;
+  ValueCount& count_;
+  std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
+};
+
+template <class F>
+void with_vtk_scalars(const DicomHeader& h, F&& take) {
+  // The codecs would tell of it on standard error; what matters comes back as an error code or as wrong sizes.
+  static const bool quiet = [] {
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
+    gdcm::Trace::DebugOff();
+    return true;
+  }();
+  static_cast<void>(quiet);
+  vtkNew<vtkDICOMReader> reader;
+  reader->SetFileName(h.file.c_str());
+  reader->SetMemoryRowOrderToFileNative();
+  reader->AutoRescaleOff();
+  reader->SortingOff();  // frames in the order of the file
+  reader->Update();
+  if (reader->GetErrorCode() != vtkErrorCode::NoError) {
+    throw PixelError("its pixels cannot be read: " + std::string(vtkErrorCode::GetStringFromErrorCode(reader->GetErrorCode())));
+  }
+  vtkDataArray* const scalars = reader->GetOutput()->GetPointData()->GetScalars();
+  const std::size_t n = h.pixels_per_frame() * h.frames.size();
+  if (scalars == nullptr || static_cast<std::size_t>(scalars->GetNumberOfValues()) != n) {
+    throw PixelError("its pixels cannot be read: it does not hold " + std::to_string(h.frames.size()) +
+                     " grey pictures of the stated size");
+  }
+  const void* const p = scalars->GetVoidPointer(0);
+  switch (scalars->GetDataType()) {
+    case VTK_SHORT:
+      return take(static_cast<const std::int16_t*>(p));
+    case VTK_UNSIGNED_SHORT:
+      return take(static_cast<const std::uint16_t*>(p));
+    case VTK_UNSIGNED_CHAR:
+      return take(static_cast<const std::uint8_t*>(p));
+    case VTK_SIGNED_CHAR:
+    case VTK_CHAR:
+      return take(static_cast<const std::int8_t*>(p));
+    case VTK_INT:
+      return take(static_cast<const std::int32_t*>(p));
+    case VTK_UNSIGNED_INT:
+      return take(static_cast<const std::uint32_t*>(p));
+    default:
+      throw PixelError("its pixels are of an unusual type");
+  }
+}
+
+}  // namespace
+
+void ValueCount::add(const ValueCount& o) {
+  hu_min = std::min(hu_min, o.hu_min);
+  hu_max = std::max(hu_max, o.hu_max);
+  pixels += o.pixels;
+  by_tag += o.by_tag;
+  found += o.found;
+  declared_tissue += o.declared_tissue;
+  out_of_range += o.out_of_range;
+  saturated += o.saturated;
+  metal += o.metal;
+  padding_hu = std::min(padding_hu, o.padding_hu);
+  fractional = fractional || o.fractional;
+  if (histogram.empty()) histogram.assign(kBins, 0);
+  for (std::size_t i = 0; i < o.histogram.size(); ++i) histogram[i] += o.histogram[i];
+}
+
+void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, ValueCount& count) {
+  const std::size_t n = h.pixels_per_frame(), columns = static_cast<std::size_t>(h.columns), rows = static_cast<std::size_t>(h.rows);
+  const auto frame_of = [&](const FrameTarget& t) -> const DicomFrame& { return h.frames[static_cast<std::size_t>(t.frame)]; };
+  if (h.compressed || h.bits_allocated != 16) {
+    with_vtk_scalars(h, [&](const auto* p) {
+      for (const FrameTarget& t : targets) {
+        Converter(h, frame_of(t), count).run(p + static_cast<std::size_t>(t.frame) * n, t.out, columns, rows);
+      }
+    });
+    return;
+  }
+  for (const FrameTarget& t : targets) {
+    // Read into place and converted there.
+    read_bytes(h, h.pixel_offset + static_cast<std::uint64_t>(t.frame) * h.bytes_per_frame(), t.out, n * 2);
+    if (h.big_endian) {
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto v = static_cast<std::uint16_t>(t.out[i]);
+        t.out[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(v << 8 | v >> 8));
+      }
+    }
+    remove_overlay(h, t.out, n);
+    Converter convert(h, frame_of(t), count);
+    if (h.is_signed) {
+      convert.run(t.out, t.out, columns, rows);
+    } else {
+      convert.run(reinterpret_cast<const std::uint16_t*>(t.out), t.out, columns, rows);
+    }
+  }
+}
+
+void convert_values(const DicomHeader& h, const std::int16_t* stored, std::int16_t* out, ValueCount& count) {
+  Converter(h, h.frames.front(), count).run(stored, out, static_cast<std::size_t>(h.columns), static_cast<std::size_t>(h.rows));
+}
+
+bool same_stored_pixels(const DicomHeader& a, const DicomHeader& b) {
+  if (a.columns != b.columns || a.rows != b.rows || a.frames.size() != 1 || b.frames.size() != 1) return false;
+  if (a.is_signed != b.is_signed || a.bits_allocated != b.bits_allocated) return false;
+  try {
+    std::vector<std::int16_t> p(a.pixels_per_frame()), q(b.pixels_per_frame());
+    ValueCount ignored;
+    const FrameTarget to_p{0, p.data()}, to_q{0, q.data()};
+    read_frames_hu(a, {&to_p, 1}, ignored);
+    read_frames_hu(b, {&to_q, 1}, ignored);
+    return p == q;
+  } catch (const PixelError&) {
+    return false;
+  }
+}
+
+}  // namespace osteo::dicom

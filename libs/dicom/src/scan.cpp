@@ -1,0 +1,293 @@
+#include "osteo/dicom/scan.h"
+
+#include <vtkDICOMItem.h>
+#include <vtkDICOMMetaData.h>
+#include <vtkDICOMParser.h>
+#include <vtkDICOMSequence.h>
+#include <vtkDICOMValue.h>
+#include <vtkNew.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
+#include "osteo/base/param.h"
+#include "osteo/io/vtk_data.h"
+#include "unpack.h"
+
+namespace osteo {
+namespace {
+
+struct Found {
+  fs::path file;
+  std::string name;
+};
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::vector<Found> files_below(const fs::path& folder, std::vector<FileSetAside>& unreadable) {
+  std::vector<Found> found;
+  std::error_code ec;
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied, ec), end;
+  for (; !ec && it != end; it.increment(ec)) {
+    std::error_code status;
+    if (it->is_regular_file(status)) found.push_back({it->path(), it->path().lexically_relative(folder).string()});
+    if (it->is_directory(status) && ::access(it->path().c_str(), R_OK | X_OK) != 0) {
+      unreadable.push_back({it->path().lexically_relative(folder).string(), std::string(code::cannot_read), "the folder may not be read"});
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+  return found;
+}
+
+// The files that a DICOMDIR names; names on media are upper case, on disk not always.
+std::vector<Found> files_of_index(const fs::path& index, std::vector<FileSetAside>& missing) {
+  vtkNew<vtkDICOMParser> parser;
+  vtkNew<vtkDICOMMetaData> meta;
+  parser->SetMetaData(meta);
+  parser->SetFileName(index.c_str());
+  parser->Update();
+  const vtkDICOMValue& records = meta->Get(DC::DirectoryRecordSequence);
+  if (records.GetNumberOfValues() == 0) return {};
+  const vtkDICOMItem* const items = records.GetSequenceData();
+  std::vector<Found> found;
+  std::map<fs::path, std::map<std::string, fs::path>> listing;  // folder -> lower-case name -> entry
+  for (std::size_t i = 0; i < records.GetNumberOfValues(); ++i) {
+    const vtkDICOMValue& id = items[i].Get(DC::ReferencedFileID);
+    if (id.GetNumberOfValues() == 0) continue;
+    fs::path at = index.parent_path().empty() ? fs::path(".") : index.parent_path();
+    std::string name;
+    bool there = true;
+    for (std::size_t part = 0; part < id.GetNumberOfValues() && there; ++part) {
+      std::string piece = id.GetString(part);
+      while (!piece.empty() && piece.back() == ' ') piece.pop_back();
+      if (piece == ".." || piece.find('/') != std::string::npos) there = false;
+      name += (name.empty() ? "" : "/") + piece;
+      auto& entries = listing[at];
+      if (entries.empty()) {
+        std::error_code ec;
+        for (const auto& e : fs::directory_iterator(at, ec)) entries[lower(e.path().filename().string())] = e.path();
+      }
+      const auto it = entries.find(lower(piece));
+      there = there && it != entries.end();
+      if (there) at = it->second;
+    }
+    if (there) {
+      found.push_back({at, name});
+    } else {
+      missing.push_back({name, std::string(code::missing_file), "the DICOMDIR names it, but it is not there"});
+    }
+  }
+  return found;
+}
+
+// A name, or free text, that holds a value which identifies the patient.
+bool identifies(const std::string& text, const std::set<std::string>& values) {
+  const std::string low = lower(text);
+  return std::any_of(values.begin(), values.end(), [&](const std::string& v) { return low.find(v) != std::string::npos; });
+}
+
+// Folders that identify become "*", the file itself its number in the order of names.
+std::string without_identity(const std::string& name, const std::set<std::string>& values, const std::string& number) {
+  std::string shown;
+  std::size_t at = 0;
+  while (at <= name.size()) {
+    const std::size_t slash = std::min(name.find('/', at), name.size());
+    const std::string part = name.substr(at, slash - at);
+    const bool last = slash == name.size();
+    shown += (identifies(part, values) ? (last ? number : "*") : part) + (last ? "" : "/");
+    at = slash + 1;
+  }
+  return shown;
+}
+
+bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
+  const std::string kernel = lower(s.kernel), maker = lower(manufacturer), text = lower(s.description);
+  for (const char* word : {"bone", "knochen", "osseux", "hueso", "osso", "petr", "temporal", "mastoid", "iac", "edge", "sharp"}) {
+    if (text.find(word) != std::string::npos || kernel.find(word) != std::string::npos) return true;
+  }
+  const auto number = [&]() {
+    const std::size_t at = kernel.find_first_of("0123456789");
+    return at == std::string::npos ? 0 : std::atoi(kernel.c_str() + at);
+  };
+  if (maker.find("siemens") != std::string::npos) return number() >= 60;  // B60 to B80, H60, Hr64, U90: sharp
+  if (maker.find("toshiba") != std::string::npos || maker.find("canon") != std::string::npos) {
+    return (number() >= 30 && number() <= 39) || number() >= 80;  // FC30 to FC35, FC80: bone, high resolution
+  }
+  if (maker.find("philips") != std::string::npos)
+    return kernel == "d" || kernel == "e" || kernel == "ya" || kernel == "yb" || kernel == "yc" || kernel == "yd";
+  return false;
+}
+
+// Lower is better for drilling bone: thin, sharp, axial, whole.
+double cost(const DicomSeries& s, const Placement& p, std::string& why) {
+  const bool bone = bone_kernel(s, s.headers.front().manufacturer);
+  const bool axial = std::abs(p.normal.z) > 0.7;
+  const bool whole = !p.verdict.has(code::slices_missing) && p.verdict.set_aside.empty();
+  const bool original = s.headers.front().image_type.starts_with("ORIGINAL") || s.headers.front().image_type.empty();
+  const double extent = p.slices.back().along_mm;
+  why = "slices " + format_number(std::round(p.verdict.gap_usual_mm * 100) / 100) + " mm apart";
+  if (bone) why += ", bone kernel";
+  why += axial ? ", axial" : ", not axial";
+  why += whole ? ", complete" : ", incomplete";
+  if (!original) why += ", derived pictures";
+  const double thick = std::max({p.verdict.gap_usual_mm, s.thickness_mm * 0.7, 0.1});
+  return thick * (bone ? 0.6 : 1) * (axial ? 1 : 2) * (whole ? 1 : 1.5) * (original ? 1 : 1.5) * (extent < 30 ? 4 : 1);
+}
+
+void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
+  const DicomHeader& first = s.headers.front();
+  const bool all_localizers =
+      std::all_of(s.headers.begin(), s.headers.end(), [](const auto& h) { return h.problem_code == code::localizer; });
+  if (all_localizers) {
+    s.what = "localizer";
+    s.problem = "it is a localizer";
+    return;
+  }
+  const Placement p = place_slices(s.headers, options);
+  s.gap_mm = p.verdict.gap_usual_mm;
+  for (const Finding& f : p.verdict.findings) {
+    if (f.severity != Severity::error) continue;
+    s.what = f.code == code::not_ct ? first.modality + ", not CT" : "refused: " + f.code;
+    s.problem = f.message;
+    return;
+  }
+  s.usable = true;
+  const Vec3 n = p.normal;
+  s.what = std::string(std::abs(n.z) > 0.7 ? "axial" : std::abs(n.y) > 0.7 ? "coronal" : std::abs(n.x) > 0.7 ? "sagittal" : "oblique");
+  if (p.verdict.tilt_deg > 0.05) s.what += ", tilted";
+  if (p.verdict.has(code::gaps_uneven)) s.what += ", uneven";
+  if (p.verdict.has(code::slices_missing)) s.what += ", holes";
+  if (p.verdict.stacks > 1) s.what += ", " + std::to_string(p.verdict.stacks) + " stacks";
+  price = cost(s, p, s.why);
+}
+
+}  // namespace
+
+bool is_archive(const fs::path& file) {
+  const std::string name = lower(file.filename().string());
+  for (const char* suffix : {".zip", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.bz2", ".7z"}) {
+    if (name.ends_with(suffix)) return true;
+  }
+  char head[4] = {};
+  std::ifstream(file, std::ios::binary).read(head, 4);
+  return head[0] == 'P' && head[1] == 'K' && head[2] == 3 && head[3] == 4;
+}
+
+DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const Context& context) {
+  require_readable(source);
+  const QuietVtk quiet;
+  DicomScan scan;
+  scan.scratch = std::make_shared<TemporaryFolder>();
+  std::vector<Found> found;
+  if (fs::is_directory(source)) {
+    found = files_below(source, scan.set_aside);
+  } else if (is_archive(source)) {
+    for (auto& u : dicom::unpack(source, scan.scratch->path(), context.sub(0, 0.4))) found.push_back({u.file, u.name});
+    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+  } else {
+    found = files_of_index(source, scan.set_aside);
+    if (found.empty()) found.push_back({source, source.filename().string()});
+  }
+  scan.files = found.size();
+
+  std::vector<DicomHeader> headers(found.size());
+  std::atomic<std::size_t> done{0};
+  parallel_for(found.size(), 16, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      headers[i] = read_dicom_header(found[i].file, scan.scratch->path());
+      headers[i].name = found[i].name;
+    }
+    done += end - begin;
+    context.progress(0.4 + 0.5 * static_cast<double>(done) / static_cast<double>(found.size()), "reading headers");
+  });
+
+  std::set<std::string> identifying;
+  for (DicomHeader& h : headers) {
+    identifying.insert(h.identifying.begin(), h.identifying.end());
+    h.identifying.clear();
+    h.identifying.shrink_to_fit();
+  }
+  const auto number_of = [](std::size_t i) {
+    const std::string n = std::to_string(i + 1);
+    return "file-" + std::string(n.size() < 6 ? 6 - n.size() : 0, '0') + n;
+  };
+  std::map<std::string, std::size_t> group;
+  for (std::size_t i = 0; i < headers.size(); ++i) {
+    DicomHeader& h = headers[i];
+    h.name = without_identity(h.name, identifying, number_of(i));
+    const bool alone = h.frames.empty() && !h.usable() && h.problem_code != code::pixels_damaged;
+    if (alone) {
+      scan.set_aside.push_back({h.name, h.problem_code, h.problem});
+      continue;
+    }
+    const std::string key = h.series_uid.empty() ? h.study_uid + "/" + std::to_string(h.series_number) + "/" + h.description : h.series_uid;
+    const auto [it, is_new] = group.try_emplace(key, scan.series.size());
+    if (is_new) scan.series.emplace_back();
+    scan.series[it->second].headers.push_back(std::move(h));
+  }
+  for (FileSetAside& f : scan.set_aside) {
+    f.file = without_identity(f.file, identifying, "(name removed)");
+  }
+  // Pictures that could be of no volume go by name: a whole series of them is still worth a line.
+  std::vector<double> price(scan.series.size(), 1e30);
+  for (std::size_t i = 0; i < scan.series.size(); ++i) {
+    DicomSeries& s = scan.series[i];
+    const auto good = std::find_if(s.headers.begin(), s.headers.end(), [](const auto& h) { return h.usable(); });
+    const DicomHeader& h = good == s.headers.end() ? s.headers.front() : *good;
+    s.number = h.series_number;
+    s.uid = h.series_uid;
+    s.modality = h.modality;
+    s.description = identifies(h.description, identifying) ? "(removed)" : h.description;
+    s.kernel = h.kernel;
+    s.columns = h.columns;
+    s.rows = h.rows;
+    s.pixel_mm = h.frames.empty() ? 0 : h.frames.front().column_spacing_mm;
+    s.thickness_mm = h.thickness_mm;
+    for (const auto& each : s.headers) s.images += static_cast<int>(each.frames.size());
+    judge(s, options, price[i]);
+    context.progress(0.9 + 0.1 * static_cast<double>(i + 1) / static_cast<double>(scan.series.size()), "sorting");
+  }
+  if (scan.series.empty()) {
+    const std::string more = scan.set_aside.empty() ? "" : " ('" + scan.set_aside.front().file + "': " + scan.set_aside.front().why + ")";
+    throw Error(ExitCode::no_input, "'" + source.string() + "' holds no DICOM image" + more,
+                "give the folder with the CT's slices, or a .nrrd, .nii.gz, .mha or .vti file");
+  }
+  const auto best = std::min_element(price.begin(), price.end());
+  if (*best < 1e30) scan.series[static_cast<std::size_t>(best - price.begin())].recommended = true;
+  std::stable_sort(scan.series.begin(), scan.series.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  return scan;
+}
+
+const DicomSeries& choose_series(const DicomScan& scan, const std::string& wanted, const std::string& source_name) {
+  const DicomSeries* found = nullptr;
+  for (const DicomSeries& s : scan.series) {
+    if (!(wanted.empty() ? s.recommended : std::to_string(s.number) == wanted || s.uid == wanted)) continue;
+    if (found != nullptr && !wanted.empty()) {
+      throw Error(ExitCode::usage, "there are several series " + wanted,
+                  "'osteo import --list --json FOLDER' shows their UIDs: give one of those");
+    }
+    found = &s;
+  }
+  if (found != nullptr) return *found;
+  // When there is but one, its own verdict says more than a list.
+  if (wanted.empty() && scan.series.size() == 1) return scan.series.front();
+  std::string list;
+  for (const DicomSeries& s : scan.series)
+    list += (list.empty() ? "" : "; ") + std::to_string(s.number) + ": " + (s.problem.empty() ? s.what : s.problem);
+  if (wanted.empty()) {
+    throw Error(ExitCode::no_input, "'" + source_name + "' holds no CT series that makes a volume (" + list + ")",
+                "'osteo import --list FOLDER' shows what each series is");
+  }
+  throw Error(ExitCode::usage, "there is no series '" + wanted + "' (" + list + ")", "'osteo import --list FOLDER' shows the series");
+}
+
+}  // namespace osteo

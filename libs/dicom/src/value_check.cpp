@@ -1,0 +1,139 @@
+#include "value_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/base/param.h"
+
+namespace osteo::dicom {
+namespace {
+
+struct Peak {
+  double hu = 0, share = 0;
+};
+
+double centre_of(int bin) {
+  return -1200 + 4 * bin + 1.5;
+}
+int bin_of(double hu) {
+  return std::clamp(static_cast<int>((hu + 1200) / 4), 0, ValueCount::kBins - 1);
+}
+
+// The highest place of the histogram between two values, and the share of all voxels within 40 HU of it.
+Peak peak_between(const std::vector<double>& smooth, const std::vector<std::uint32_t>& raw, double total, double lo, double hi) {
+  const int a = bin_of(lo), b = bin_of(hi);
+  const auto it = std::max_element(smooth.begin() + a, smooth.begin() + b + 1);
+  const int at = static_cast<int>(it - smooth.begin());
+  double near = 0;
+  for (int i = std::max(0, at - 10); i <= std::min(ValueCount::kBins - 1, at + 10); ++i) near += raw[static_cast<std::size_t>(i)];
+  return {centre_of(at), total > 0 ? near / total : 0};
+}
+
+std::string whole(double v) {
+  return format_number(std::round(v));
+}
+
+}  // namespace
+
+void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
+  ValueCheck& c = v.values;
+  c.checked = true;
+  c.hu_min = count.hu_min;
+  c.hu_max = count.hu_max;
+  c.rounding_error_hu = count.fractional ? 0.5 : 0;
+  if (count.fractional) {
+    v.add(code::values_rounded, Severity::info, "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
+  }
+
+  const double pixels = std::max<double>(1, static_cast<double>(count.pixels));
+  c.padding_share = static_cast<double>(count.by_tag + count.found) / pixels;
+  c.padding_hu = count.padding_hu;
+  c.padding_source = count.by_tag > 0 ? (count.found > 0 ? "tag and found" : "tag") : count.found > 0 ? "found" : "none";
+  const std::string share = format_number(std::round(c.padding_share * 1000) / 10) + " % of the pixels";
+  if (count.by_tag > 0)
+    v.add(code::padding_tag, Severity::info, "padding (" + whole(c.padding_hu) + " HU by its tag), " + share + ", is taken as air");
+  if (count.found > 0) {
+    v.add(code::padding_found, Severity::info,
+          "values down to " + whole(c.padding_hu) + " HU" +
+              (count.by_tag > 0 ? " besides those of the padding tag" : ", " + share + ", no tag names them") +
+              ", are taken for padding and become air");
+  }
+  if (static_cast<double>(count.declared_tissue) > 0.001 * pixels) {
+    v.add(code::padding_tag_wrong, Severity::warning, "the padding tag names a value that tissue has; the tag is ignored");
+  }
+  if (count.out_of_range > 0) {
+    const bool many = static_cast<double>(count.out_of_range) > 1e-4 * pixels;
+    v.add(code::values_out_of_range, many ? Severity::error : Severity::warning,
+          std::to_string(count.out_of_range) + " pixels are above 32767 HU (up to " + std::to_string(count.hu_max) + ")" +
+              (many ? "" : "; they are cut there"),
+          many ? "the file states the wrong sign or scale of its pixels; ask for the original export" : "");
+  }
+  c.saturated_mm3 = static_cast<double>(count.saturated) * voxel_mm3;
+  c.metal_mm3 = static_cast<double>(count.metal) * voxel_mm3;
+  if (c.saturated_mm3 > 1) {
+    v.add(code::saturated, Severity::info,
+          whole(c.saturated_mm3) + " mm3 are at the top of the stored range (" + std::to_string(count.hu_max) +
+              " HU): denser matter is not told apart",
+          "an extended CT scale shows metal better");
+  }
+  if (c.metal_mm3 > 20) {
+    v.add(code::metal, Severity::info, whole(c.metal_mm3) + " mm3 are at 3000 HU or above, as metal is; near it, streaks look like bone",
+          "look at the mask near it; 'threshold --metal-mm' clears streaks");
+  }
+
+  const auto& raw = count.histogram;
+  if (raw.empty()) return;
+  double total = 0;
+  std::vector<double> smooth(raw.size());
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    total += raw[i];
+    for (std::size_t j = i >= 2 ? i - 2 : 0; j < std::min(raw.size(), i + 3); ++j) smooth[i] += raw[j];
+  }
+  const Peak air = peak_between(smooth, raw, total, -1100, -850), soft = peak_between(smooth, raw, total, -250, 250);
+  c.has_air = air.share > 0.005;
+  // What else there is much of between air and bone's core: tissue on a wrong scale would lie there.
+  const Peak above = peak_between(smooth, raw, total, 250, 1500), under = peak_between(smooth, raw, total, -850, -250);
+  c.has_soft_tissue = soft.share > 0.01 && soft.share > 0.15 * std::max(above.share, under.share);
+  c.air_hu = air.hu;
+  c.soft_tissue_hu = soft.hu;
+  const bool air_right = c.has_air && air.hu > -1040 && air.hu < -940;
+  const bool soft_right = c.has_soft_tissue && soft.hu > -150 && soft.hu < 150;
+  // Outside the scan the scanner may have cut everything off at -1024.
+  const bool cut_air = c.padding_share > 0.01 || count.hu_min <= kAirHu;
+  c.plausible = soft_right && (air_right || (!c.has_air && count.hu_min < -200));
+  const std::string range = std::to_string(count.hu_min) + " to " + std::to_string(count.hu_max);
+  if (c.plausible) {
+    if (!c.has_air && !cut_air) v.add(code::no_air, Severity::info, "there is no air in the pictures by which to check the HU scale");
+    return;
+  }
+  const std::string advice = "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
+  const Peak plus_air = peak_between(smooth, raw, total, 850, 1100);
+  double below = 0;
+  for (int i = 0; i < bin_of(-900); ++i) below += raw[static_cast<std::size_t>(i)];
+  if (plus_air.share > 0.2 && std::abs(plus_air.hu - 1000) < 60 && !c.has_air && count.hu_min < -150 && below < 0.01 * total) {
+    v.add(code::hu_wrong_sign, Severity::error,
+          "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
+          "the file states the wrong scale; ask for the original export");
+    return;
+  }
+  // The two highest peaks that stand apart, for a word on what could be wrong.
+  const Peak first = peak_between(smooth, raw, total, -1200, 3000);
+  const Peak left = first.hu - 300 > -1200 ? peak_between(smooth, raw, total, -1200, first.hu - 300) : Peak{};
+  const Peak right = first.hu + 300 < 3000 ? peak_between(smooth, raw, total, first.hu + 300, 3000) : Peak{};
+  const Peak& second = left.share > right.share ? left : right;
+  const double apart = std::abs(first.hu - second.hu), low = std::min(first.hu, second.hu);
+  if (second.share > 0.02 && apart > 940 && apart < 1130) {
+    v.add(code::hu_shifted, Severity::warning,
+          "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) + ", tissue at " +
+              whole(low + apart),
+          advice);
+  } else if (second.share > 0.02 && apart > 400 && c.has_air) {
+    v.add(code::hu_scaled, Severity::warning,
+          "the values (" + range + ") look like HU on another scale: air at " + whole(low) + ", tissue at " + whole(low + apart), advice);
+  } else {
+    v.add(code::not_hu, Severity::warning,
+          "the values (" + range + ") do not look like Hounsfield units; cone-beam scanners give greys like these", advice);
+  }
+}
+
+}  // namespace osteo::dicom

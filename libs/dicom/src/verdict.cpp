@@ -1,0 +1,118 @@
+#include "osteo/dicom/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+// Ten micrometres are the promise; a hundredth of that is enough to print.
+double tidy(double v) {
+  const double r = std::round(v * 1e4) / 1e4;
+  return r == 0 ? 0.0 : r;
+}
+ordered_json triple(Vec3 v) {
+  return {tidy(v.x), tidy(v.y), tidy(v.z)};
+}
+ordered_json direction(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+
+}  // namespace
+
+void Verdict::add(std::string_view code, Severity severity, std::string message, std::string advice, std::vector<std::string> files) {
+  findings.push_back({std::string(code), severity, std::move(message), std::move(advice), std::move(files)});
+}
+
+bool Verdict::has(std::string_view wanted) const {
+  return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) { return f.code == wanted; });
+}
+
+bool Verdict::refused() const {
+  return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::error; });
+}
+
+std::string Verdict::status() const {
+  if (refused()) return "refused";
+  const bool warned = std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::warning; });
+  return resampled || warned ? "repaired" : "good";
+}
+
+std::string to_json(const Verdict& v) {
+  static constexpr const char* kSeverity[] = {"info", "warning", "error"};
+  ordered_json j;
+  j["osteotome_verdict"] = 1;
+  j["status"] = v.status();
+  j["findings"] = ordered_json::array();
+  for (const Finding& f : v.findings) {
+    ordered_json e{{"code", f.code}, {"severity", kSeverity[static_cast<int>(f.severity)]}, {"message", f.message}};
+    if (!f.advice.empty()) e["advice"] = f.advice;
+    if (!f.files.empty()) e["files"] = f.files;
+    j["findings"].push_back(std::move(e));
+  }
+  j["source"] = v.source;
+  if (v.source == "DICOM") {
+    j["series"] = {{"number", v.series},     {"stack", v.stack},   {"stacks", v.stacks},
+                   {"modality", v.modality}, {"kernel", v.kernel}, {"thickness_mm", tidy(v.thickness_mm)},
+                   {"why", v.why_chosen}};
+    j["geometry"] = {{"slices", v.slices.size()},
+                     {"columns", v.columns},
+                     {"rows", v.rows},
+                     {"pixel_mm", {v.pixel_mm[0], v.pixel_mm[1]}},
+                     {"gap_min_mm", tidy(v.gap_min_mm)},
+                     {"gap_max_mm", tidy(v.gap_max_mm)},
+                     {"gap_usual_mm", tidy(v.gap_usual_mm)},
+                     {"tilt_deg", tidy(v.tilt_deg)},
+                     {"shear_mm_per_mm", {tidy(v.shear_mm_per_mm[0]), tidy(v.shear_mm_per_mm[1])}},
+                     {"resampled", v.resampled},
+                     {"position_error_mm", tidy(v.position_error_mm)}};
+  }
+  if (v.output.voxel_count() > 0) {
+    j["output"] = {
+        {"dims", v.output.dims},
+        {"spacing_mm", {v.output.spacing_mm.x, v.output.spacing_mm.y, v.output.spacing_mm.z}},
+        {"origin_lps_mm", triple(v.output.origin_mm)},
+        {"direction",
+         {direction(v.output.direction.column[0]), direction(v.output.direction.column[1]), direction(v.output.direction.column[2])}},
+        {"axes", orientation_code(v.output)}};
+  }
+  if (v.values.checked) {
+    ordered_json values{{"hu_min", v.values.hu_min}, {"hu_max", v.values.hu_max}, {"plausible_hu", v.values.plausible}};
+    values["air_hu"] = v.values.has_air ? ordered_json(tidy(v.values.air_hu)) : ordered_json(nullptr);
+    values["soft_tissue_hu"] = v.values.has_soft_tissue ? ordered_json(tidy(v.values.soft_tissue_hu)) : ordered_json(nullptr);
+    values["padding"] = {{"source", v.values.padding_source}, {"share", tidy(v.values.padding_share)}};
+    if (v.values.padding_source != "none") values["padding"]["hu"] = tidy(v.values.padding_hu);
+    values["saturated_mm3"] = tidy(v.values.saturated_mm3);
+    values["metal_mm3"] = tidy(v.values.metal_mm3);
+    values["rounding_error_hu"] = v.values.rounding_error_hu;
+    j["values"] = std::move(values);
+  }
+  if (v.source == "DICOM") {
+    j["gaps"] = ordered_json::array();
+    for (const SliceGap& g : v.gaps) {
+      j["gaps"].push_back({{"after", g.after},
+                           {"before", g.before},
+                           {"gap_mm", tidy(g.gap_mm)},
+                           {"usual_mm", tidy(g.usual_mm)},
+                           {"missing", g.missing},
+                           {"filled", g.filled}});
+    }
+    j["slices"] = ordered_json::array();
+    for (const SliceRecord& s : v.slices) {
+      ordered_json e{{"file", s.file},
+                     {"position_lps_mm", triple(s.position_mm)},
+                     {"along_mm", tidy(s.along_mm)},
+                     {"output_slice", tidy(s.output_index)}};
+      if (s.frame > 0) e["frame"] = s.frame;
+      j["slices"].push_back(std::move(e));
+    }
+    j["set_aside"] = ordered_json::array();
+    for (const FileSetAside& f : v.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
+  }
+  return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace osteo

@@ -1,0 +1,626 @@
+// The hard list of CT import, one test a case, with the verdict each must get.
+#include <dcmtk/dcmjpls/djdecode.h>
+#include <dcmtk/dcmjpls/djencode.h>
+
+#include <cmath>
+#include <random>
+
+#include "edit.h"
+#include "osteo/dicom/import.h"
+#include "osteo/dicom/volume.h"
+
+namespace osteo {
+namespace {
+
+using test::data;
+using test::put;
+using test::Series;
+using test::straight_series;
+
+std::vector<fs::path> slices(int begin, int end) {
+  const auto& all = straight_series();
+  return {all.begin() + begin, all.begin() + end};
+}
+
+// Every slice read by DCMTK, for a reference that shares no code with the reader.
+struct Reference {
+  struct Slice {
+    Vec3 position, u, v;
+    double du, dv, slope = 1, intercept = 0;
+    int columns, rows;
+    std::vector<double> hu;
+    double along;
+  };
+  std::vector<Slice> slices;
+  Vec3 normal;
+
+  explicit Reference(const fs::path& folder) {
+    for (const auto& f : test::files_in(folder)) {
+      DcmFileFormat file;
+      if (file.loadFile(f.c_str()).bad()) continue;
+      DcmDataset& d = *file.getDataset();
+      Uint16 rows = 0, columns = 0, is_signed = 0;
+      if (d.findAndGetUint16(DCM_Rows, rows).bad() || !d.tagExists(DCM_ImagePositionPatient)) continue;
+      d.findAndGetUint16(DCM_Columns, columns);
+      d.findAndGetUint16(DCM_PixelRepresentation, is_signed);
+      Slice s;
+      s.columns = columns;
+      s.rows = rows;
+      s.position = test::position_of(d);
+      for (unsigned a = 0; a < 3; ++a) {
+        d.findAndGetFloat64(DCM_ImageOrientationPatient, s.u[a], a);
+        d.findAndGetFloat64(DCM_ImageOrientationPatient, s.v[a], a + 3);
+      }
+      d.findAndGetFloat64(DCM_PixelSpacing, s.dv, 0);
+      d.findAndGetFloat64(DCM_PixelSpacing, s.du, 1);
+      d.findAndGetFloat64(DCM_RescaleSlope, s.slope);
+      d.findAndGetFloat64(DCM_RescaleIntercept, s.intercept);
+      const Uint16* pixels = nullptr;
+      if (d.findAndGetUint16Array(DCM_PixelData, pixels).bad()) continue;
+      for (int i = 0; i < rows * columns; ++i) {
+        s.hu.push_back(s.slope * (is_signed ? static_cast<std::int16_t>(pixels[i]) : static_cast<int>(pixels[i])) + s.intercept);
+      }
+      slices.push_back(std::move(s));
+    }
+    normal = cross(slices.front().u, slices.front().v);
+    for (Slice& s : slices) s.along = dot(s.position, normal);
+    std::sort(slices.begin(), slices.end(), [](const Slice& a, const Slice& b) { return a.along < b.along; });
+  }
+
+  // HU at a point, linear in the slices and between them; NaN near padding or the border.
+  [[nodiscard]] double at(Vec3 x) const {
+    const double along = dot(x, normal);
+    for (std::size_t k = 0; k + 1 < slices.size(); ++k) {
+      if (along < slices[k].along || along > slices[k + 1].along) continue;
+      const double t = (along - slices[k].along) / (slices[k + 1].along - slices[k].along);
+      return (1 - t) * in_slice(slices[k], x) + t * in_slice(slices[k + 1], x);
+    }
+    return NAN;
+  }
+
+ private:
+  static double in_slice(const Slice& s, Vec3 x) {
+    const double i = dot(x - s.position, s.u) / s.du, j = dot(x - s.position, s.v) / s.dv;
+    const int i0 = static_cast<int>(std::floor(i)), j0 = static_cast<int>(std::floor(j));
+    if (i0 < 0 || j0 < 0 || i0 + 1 >= s.columns || j0 + 1 >= s.rows) return NAN;
+    double sum = 0;
+    for (int c = 0; c < 4; ++c) {
+      const double hu = s.hu[static_cast<std::size_t>((j0 + (c >> 1)) * s.columns + i0 + (c & 1))];
+      if (hu < -1024) return NAN;
+      sum += hu * ((c & 1) != 0 ? i - i0 : 1 - (i - i0)) * ((c >> 1) != 0 ? j - j0 : 1 - (j - j0));
+    }
+    return sum;
+  }
+};
+
+// The volume against the reference at random voxels. One HU is rounding; a place wrong by 0.01 mm shows at bone's edges.
+void expect_every_slice_in_its_place(const Image& image, const fs::path& folder) {
+  const Reference reference(folder);
+  std::mt19937 random(7);
+  int compared = 0, bone = 0;
+  for (int n = 0; n < 60000; ++n) {
+    const int i = static_cast<int>(random() % image.frame.dims[0]), j = static_cast<int>(random() % image.frame.dims[1]),
+              k = static_cast<int>(random() % image.frame.dims[2]);
+    const double wanted = reference.at(image.frame.world_from_index({double(i), double(j), double(k)}));
+    if (std::isnan(wanted)) continue;
+    ++compared;
+    bone += wanted > 300;
+    ASSERT_NEAR(image.at(i, j, k), wanted, 1.0) << i << ' ' << j << ' ' << k;
+  }
+  EXPECT_GT(compared, 5000);
+  EXPECT_GT(bone, 100);
+}
+
+Imported load(const fs::path& folder, ImportParams params = {}) {
+  return import_ct(folder, params);
+}
+
+// Refused with this code; what() names the file or says why.
+Verdict refusal(const fs::path& folder, std::string_view code, const std::string& said = {}, ImportParams params = {}) {
+  try {
+    static_cast<void>(import_ct(folder, params));
+  } catch (const Refused& e) {
+    EXPECT_TRUE(e.verdict().refused());
+    EXPECT_TRUE(e.verdict().has(code)) << e.what();
+    EXPECT_NE(std::string(e.what()).find(said), std::string::npos) << e.what();
+    return e.verdict();
+  } catch (const Error& e) {
+    ADD_FAILURE() << "another error: " << e.what();
+    return {};
+  }
+  ADD_FAILURE() << "not refused";
+  return {};
+}
+
+const SliceGap& only_gap(const Verdict& v) {
+  static const SliceGap none;
+  EXPECT_EQ(v.gaps.size(), 1u);
+  return v.gaps.empty() ? none : v.gaps.front();
+}
+
+#define NEEDS(folder) \
+  if (!fs::exists(folder)) GTEST_SKIP() << "no " << (folder)
+
+TEST(HardCase, C01_TiltAndUnevenGaps) {
+  const auto folder = data("dicom_ct_head_tilt_gaps");
+  NEEDS(folder);
+  const Imported r = load(folder);
+  for (const auto code : {code::tilted, code::gaps_uneven, code::padding_tag}) EXPECT_TRUE(r.verdict.has(code)) << code;
+  EXPECT_EQ(r.verdict.status(), "repaired");
+  EXPECT_NEAR(r.verdict.tilt_deg, 18.5, 0.01);
+  EXPECT_LE(r.verdict.position_error_mm, 0.01);
+  EXPECT_EQ(r.verdict.slices.size(), 28u);
+  EXPECT_NEAR(r.verdict.values.padding_hu, -1500, 0);
+  expect_every_slice_in_its_place(r.image, folder);
+}
+
+TEST(HardCase, C02_TiltWithoutItsTag) {
+  const auto folder = data("dicom_hard_geometry") / "gantrytilting" / "001";
+  NEEDS(folder);
+  const Imported r = load(folder);
+  EXPECT_TRUE(r.verdict.has(code::tilted));
+  EXPECT_NEAR(r.verdict.tilt_deg, 14.0, 0.05);
+  // The pixels are a ramp, not a CT: the HU check must say so.
+  EXPECT_FALSE(r.verdict.values.plausible);
+  const Reference reference(folder);
+  for (const Vec3 index : {Vec3{100, 200, 1}, Vec3{300, 260, 3}, Vec3{256, 300, 7}}) {
+    const double wanted = reference.at(r.image.frame.world_from_index(index));
+    EXPECT_NEAR(r.image.at(int(index.x), int(index.y), int(index.z)), std::max(wanted, -1024.0), 1.0);
+  }
+}
+
+TEST(HardCase, C03_TiltWithIndexFilesInTheFolder) {
+  const auto folder = data("dicom_ct_skull_phantom") / "S21610" / "S2010";
+  NEEDS(folder);
+  const Imported r = load(folder);
+  EXPECT_TRUE(r.verdict.has(code::tilted));
+  EXPECT_NEAR(r.verdict.tilt_deg, 18.5, 0.01);
+  EXPECT_EQ(r.verdict.set_aside.size(), 1u);
+  expect_every_slice_in_its_place(r.image, folder);
+}
+
+TEST(HardCase, C04_OneThickSliceMissing) {
+  const auto& all = straight_series();
+  const Series s("c04", {all[0], all[5], all[10], all[20]});
+  const Verdict v = refusal(s.folder, code::hole_too_wide, "10 mm apart instead of 5 mm");
+  EXPECT_EQ(only_gap(v).missing, 1);
+  EXPECT_EQ(only_gap(v).after, "010");
+  EXPECT_EQ(only_gap(v).before, "020");
+}
+
+// Thin and tilted by moving the slices of the straight series.
+void lean(Series& s, double gap, double shear) {
+  s.edit_all([&](DcmDataset& d, int) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, p.y + shear * p.z * gap, p.z * gap}));
+  });
+}
+
+TEST(HardCase, C05_OneThinTiltedSliceMissing) {
+  Series s("c05", slices(0, 12));
+  lean(s, 0.75, std::tan(15.5 * 3.14159265358979 / 180));
+  s.drop("005");
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::tilted));
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  EXPECT_NEAR(r.verdict.tilt_deg, 15.5, 0.01);
+  EXPECT_NEAR(only_gap(r.verdict).gap_mm, 1.5, 1e-6);
+  EXPECT_TRUE(only_gap(r.verdict).filled);
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C06_OneOfSixtyMissing) {
+  Series s("c06", slices(0, 60));
+  s.drop("030");
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "repaired");
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  EXPECT_EQ(only_gap(r.verdict).after, "029");
+  EXPECT_EQ(r.image.frame.dims[2], 60);
+  EXPECT_NEAR(r.verdict.slices[30].output_index, 31, 1e-6);
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C07_FiveOfSixtyMissing) {
+  Series together("c07a", slices(0, 60));
+  for (const char* name : {"030", "031", "032", "033", "034"}) together.drop(name);
+  const Verdict v = refusal(together.folder, code::hole_too_wide, "'029' and '035'");
+  EXPECT_EQ(only_gap(v).missing, 5);
+  ImportParams wide;
+  wide.max_hole_mm = 6;
+  EXPECT_TRUE(load(together.folder, wide).verdict.has(code::slices_missing));
+
+  Series scattered("c07b", slices(0, 60));
+  for (const char* name : {"010", "020", "022", "040", "050"}) scattered.drop(name);
+  const Imported r = load(scattered.folder);
+  EXPECT_EQ(r.verdict.gaps.size(), 5u);
+  EXPECT_EQ(r.image.frame.dims[2], 60);
+  expect_every_slice_in_its_place(r.image, scattered.folder);
+}
+
+TEST(HardCase, C08_FourSlicesAtOnePlace) {
+  Series s("c08", slices(20, 24));
+  s.edit_all([](DcmDataset& d, int) { put(d, DCM_ImagePositionPatient, "0\\0\\0"); });
+  refusal(s.folder, code::not_a_volume, "one place");
+}
+
+TEST(HardCase, C09_TwoOrientationsInOneSeries) {
+  Series s("c09", slices(0, 60));
+  s.edit_all([](DcmDataset& d, int i) {
+    if (i < 40) return;
+    put(d, DCM_ImageOrientationPatient, "0\\1\\0\\0\\0\\-1");
+    put(d, DCM_ImagePositionPatient, test::text({double(i), 0, 0}));
+  });
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::several_stacks));
+  EXPECT_TRUE(r.verdict.has(code::other_orientation));
+  EXPECT_EQ(r.verdict.slices.size(), 40u);
+  EXPECT_EQ(r.verdict.set_aside.size(), 20u);
+  EXPECT_EQ(orientation_code(r.image.frame), "LPS");
+  ImportParams second;
+  second.stack = 2;
+  const Imported other = load(s.folder, second);
+  EXPECT_EQ(other.verdict.slices.size(), 20u);
+  EXPECT_EQ(orientation_code(other.image.frame), "PIR");
+  ImportParams third;
+  third.stack = 3;
+  refusal(s.folder, code::not_a_volume, "no stack 3", third);
+}
+
+TEST(HardCase, C10_ScaleOfItsOwnForEachSliceAndOblongPixels) {
+  Series s("c10", slices(0, 20));
+  s.edit_all([](DcmDataset& d, int i) {
+    put(d, DCM_RescaleSlope, std::to_string(1 + 0.03125 * i));
+    put(d, DCM_RescaleIntercept, std::to_string(-1024 + i * 1.5));
+    put(d, DCM_PixelSpacing, "0.8\\0.5");
+  });
+  const Imported r = load(s.folder);
+  EXPECT_NEAR(r.image.frame.spacing_mm.x, 0.5, 1e-9);
+  EXPECT_NEAR(r.image.frame.spacing_mm.y, 0.8, 1e-9);
+  EXPECT_TRUE(r.verdict.has(code::values_rounded));
+  expect_every_slice_in_its_place(r.image, s.folder);
+  const auto real = data("dicom_hard_geometry") / "slope_per_slice_nonsquare";
+  if (!fs::exists(real)) return;
+  refusal(real, code::not_ct, "MR");
+  ImportParams any;
+  any.any_modality = true;
+  const Imported mr = load(real, any);
+  EXPECT_NEAR(mr.image.frame.spacing_mm.y / mr.image.frame.spacing_mm.x, 4.0 / 6.4, 0.01);
+}
+
+TEST(HardCase, C11_TwoPicturesAtOnePlace) {
+  Series s("c11", slices(0, 20));
+  s.edit(
+      "010",
+      [](DcmDataset& d) {
+        put(d, DCM_SOPInstanceUID, "1.2.3.4.5");
+        Uint16* pixels = nullptr;
+        unsigned long count = 0;
+        const Uint16* read = nullptr;
+        ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+        std::vector<Uint16> copy(read, read + count);
+        pixels = copy.data();
+        pixels[1000] = static_cast<Uint16>(pixels[1000] + 1);
+        ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels, count).good());
+      },
+      "010-other");
+  refusal(s.folder, code::slices_at_one_place, "'010' and '010-other'");
+  // The same with a number of its own acquisition: two stacks, the larger is taken.
+  s.edit("010-other", [](DcmDataset& d) { put(d, DCM_AcquisitionNumber, "99"); });
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+  EXPECT_TRUE(r.verdict.has(code::other_acquisition));
+}
+
+TEST(HardCase, C11_SamePictureUnderAnotherName) {
+  Series s("c11b", slices(0, 20));
+  s.edit(
+      "010", [](DcmDataset& d) { put(d, DCM_SOPInstanceUID, "1.2.3.4.5"); }, "010-again");
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+  ASSERT_EQ(r.verdict.set_aside.size(), 1u);
+  EXPECT_EQ(r.verdict.set_aside[0].code, code::duplicate_slice);
+}
+
+TEST(HardCase, C11_TwoAcquisitionsOfTheSamePlaces) {
+  Series s("c11c", slices(0, 20));
+  for (int i = 0; i < 12; ++i) {
+    s.edit(
+        straight_series()[static_cast<std::size_t>(i)].filename().string(),
+        [&](DcmDataset& d) {
+          put(d, DCM_SOPInstanceUID, "1.2.3.4." + std::to_string(i));
+          put(d, DCM_AcquisitionNumber, "7");
+          put(d, DCM_RescaleIntercept, "-1000");
+        },
+        "second-" + std::to_string(i));
+  }
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::several_stacks));
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+}
+
+TEST(HardCase, C12_TheSameFileTwice) {
+  Series s("c12", slices(0, 20));
+  fs::copy_file(fs::canonical(s.folder / "010"), s.folder / "copy of 010");
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "good");
+  ASSERT_EQ(r.verdict.set_aside.size(), 1u);
+  EXPECT_EQ(r.verdict.set_aside[0].code, code::duplicate_file);
+  EXPECT_EQ(r.image.frame.dims[2], 20);
+}
+
+TEST(HardCase, C13_AllOfOneNumber) {
+  Series s("c13", slices(0, 20));
+  s.edit_all([](DcmDataset& d, int) { put(d, DCM_InstanceNumber, "1"); });
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "good");
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C14_OneSliceWithoutPosition) {
+  Series s("c14", slices(0, 60));
+  s.edit("030", [](DcmDataset& d) { d.findAndDeleteElement(DCM_ImagePositionPatient); });
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "repaired");
+  EXPECT_TRUE(r.verdict.has(code::position_missing));
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  ASSERT_EQ(r.verdict.set_aside.size(), 1u);
+  EXPECT_EQ(r.verdict.set_aside[0].file, "030");
+  EXPECT_EQ(r.image.frame.dims[2], 60);
+  s.drop("030");
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C15_OneFileCutShort) {
+  Series s("c15", slices(0, 60));
+  const fs::path file = s.folder / "030";
+  const fs::path original = fs::canonical(file);
+  fs::remove(file);
+  fs::copy_file(original, file);
+  fs::resize_file(file, fs::file_size(file) / 2);
+  Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::pixels_damaged));
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  EXPECT_EQ(r.verdict.set_aside.at(0).file, "030");
+  EXPECT_EQ(r.image.frame.dims[2], 60);
+  // Cut inside the header, and to nothing.
+  fs::resize_file(file, 700);
+  r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  ASSERT_FALSE(r.verdict.set_aside.empty());
+  fs::resize_file(file, 0);
+  EXPECT_TRUE(load(s.folder).verdict.has(code::slices_missing));
+}
+
+TEST(HardCase, C16_OneSliceOfAnotherSize) {
+  Series s("c16", slices(0, 60));
+  s.edit("030", [](DcmDataset& d) {
+    d.putAndInsertUint16(DCM_Rows, 32);
+    d.putAndInsertUint16(DCM_Columns, 32);
+    const std::vector<Uint16> pixels(32 * 32, 1000);
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+  });
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::other_size));
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  EXPECT_EQ(r.verdict.set_aside.at(0).file, "030");
+  s.drop("030");
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C17_LocalizerIndexAndTextInTheFolder) {
+  Series s("c17", slices(0, 20));
+  s.edit(
+      "000",
+      [](DcmDataset& d) {
+        put(d, DCM_ImageType, "ORIGINAL\\PRIMARY\\LOCALIZER");
+        put(d, DCM_ImageOrientationPatient, "0\\1\\0\\0\\0\\-1");
+        put(d, DCM_SOPInstanceUID, "1.2.3");
+      },
+      "scout");
+  write_file(s.folder / "readme.txt", "Exported by hand.\n");
+  if (fs::exists(data("dicom_ct_skull_phantom") / "DICOMDIR"))
+    fs::create_symlink(data("dicom_ct_skull_phantom") / "DICOMDIR", s.folder / "DICOMDIR");
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "good");
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+  std::vector<std::string> codes;
+  for (const auto& f : r.verdict.set_aside) codes.push_back(f.file + " " + f.code);
+  EXPECT_NE(std::find(codes.begin(), codes.end(), "scout LOCALIZER"), codes.end());
+  EXPECT_NE(std::find(codes.begin(), codes.end(), "readme.txt NOT_DICOM"), codes.end());
+}
+
+TEST(HardCase, C18_Deflated) {
+  Series s("c18", slices(0, 12));
+  s.edit_all([](DcmDataset&, int) {}, EXS_DeflatedLittleEndianExplicit);
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.status(), "good");
+  EXPECT_EQ(r.image.frame.dims[2], 12);
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
+TEST(HardCase, C19_JpegLsOfSignedPixels) {
+  DJLSEncoderRegistration::registerCodecs();
+  Series plain("c19a", slices(0, 12));
+  const auto to_signed = [](DcmDataset& d, int) {
+    const Uint16* read = nullptr;
+    unsigned long count = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+    std::vector<Uint16> pixels(read, read + count);
+    Float64 intercept = 0;
+    d.findAndGetFloat64(DCM_RescaleIntercept, intercept);
+    for (auto& p : pixels) p = static_cast<Uint16>(static_cast<std::int16_t>(p + intercept));
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+    d.putAndInsertUint16(DCM_PixelRepresentation, 1);
+    d.putAndInsertUint16(DCM_BitsStored, 16);
+    d.putAndInsertUint16(DCM_HighBit, 15);
+    put(d, DCM_RescaleIntercept, "0");
+  };
+  plain.edit_all(to_signed, EXS_LittleEndianExplicit);
+  Series coded("c19b", slices(0, 12));
+  coded.edit_all(to_signed, EXS_JPEGLSLossless);
+  const Imported a = load(plain.folder), b = load(coded.folder);
+  EXPECT_TRUE(std::equal(a.image.span().begin(), a.image.span().end(), b.image.span().begin()));
+  EXPECT_LT(a.verdict.values.hu_min, -900);
+}
+
+// Case 20 and all other encodings of one real slice, against the plain file read by DCMTK.
+TEST(HardCase, C20_EveryTransferSyntax) {
+  const auto folder = data("dicom_transfer_syntaxes");
+  NEEDS(folder);
+  std::vector<double> wanted;
+  {
+    const Series plain("c20-plain", {folder / "CTImage.dcm"});
+    wanted = Reference(plain.folder).slices.front().hu;
+  }
+  int exact = 0, lossy = 0;
+  for (const auto& f : test::files_in(folder)) {
+    if (!f.filename().string().starts_with("CTImage")) continue;
+    SCOPED_TRACE(f.filename().string());
+    // Two slices make a volume: the same pixels a millimetre higher.
+    Series s("c20", {f});
+    s.edit(
+        f.filename().string(),
+        [](DcmDataset& d) {
+          const Vec3 p = test::position_of(d);
+          put(d, DCM_ImagePositionPatient, test::text({p.x, p.y, p.z + 1}));
+          put(d, DCM_SOPInstanceUID, "1.2.3.4");
+        },
+        "second");
+    const Imported r = load(s.folder);
+    ASSERT_EQ(r.image.frame.voxel_count(), 2 * wanted.size());
+    double worst = 0, sum = 0;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      const double d = std::abs(r.image.voxels[i] - std::max(wanted[i], -1024.0));
+      worst = std::max(worst, d);
+      sum += d;
+    }
+    const std::string name = f.filename().string();
+    const bool baseline = name.find("JPEGProcess1T") != std::string::npos || name.find("JPEGProcess2") != std::string::npos ||
+                          name.find("JPEGProcess6") != std::string::npos || name.find("JPEGProcess10") != std::string::npos;
+    if (baseline || name.find("JPEGLSLossy") != std::string::npos || name.find("JPEG2000Transfer") != std::string::npos) {
+      ++lossy;
+      EXPECT_LE(worst, baseline ? 200 : name.find("LSLossy") != std::string::npos ? 1 : 5);
+      EXPECT_LT(sum / static_cast<double>(wanted.size()), 20);
+      if (baseline) {
+        EXPECT_TRUE(r.verdict.has(code::lossy));
+      }
+    } else {
+      ++exact;
+      EXPECT_EQ(worst, 0);
+    }
+  }
+  EXPECT_EQ(exact, 10);
+  EXPECT_EQ(lossy, 6);
+}
+
+TEST(HardCase, C21_EnhancedMultiFrame) {
+  Series s("c21", {straight_series()[0]});
+  const int count = 12;
+  s.edit("000", [&](DcmDataset& d) {
+    std::vector<Uint16> pixels;
+    for (int i = 0; i < count; ++i) {
+      DcmFileFormat each;
+      ASSERT_TRUE(each.loadFile(straight_series()[static_cast<std::size_t>(i)].c_str()).good());
+      const Uint16* read = nullptr;
+      unsigned long n = 0;
+      ASSERT_TRUE(each.getDataset()->findAndGetUint16Array(DCM_PixelData, read, &n).good());
+      pixels.insert(pixels.end(), read, read + n);
+      DcmItem *frame = nullptr, *group = nullptr;
+      ASSERT_TRUE(d.findOrCreateSequenceItem(DCM_PerFrameFunctionalGroupsSequence, frame, i).good());
+      ASSERT_TRUE(frame->findOrCreateSequenceItem(DCM_PlanePositionSequence, group, 0).good());
+      put(*group, DCM_ImagePositionPatient, test::text(test::position_of(*each.getDataset())));
+    }
+    DcmItem *shared = nullptr, *group = nullptr;
+    ASSERT_TRUE(d.findOrCreateSequenceItem(DCM_SharedFunctionalGroupsSequence, shared, 0).good());
+    ASSERT_TRUE(shared->findOrCreateSequenceItem(DCM_PlaneOrientationSequence, group, 0).good());
+    put(*group, DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+    ASSERT_TRUE(shared->findOrCreateSequenceItem(DCM_PixelMeasuresSequence, group, 0).good());
+    OFString spacing;
+    d.findAndGetOFStringArray(DCM_PixelSpacing, spacing);
+    put(*group, DCM_PixelSpacing, spacing.c_str());
+    ASSERT_TRUE(shared->findOrCreateSequenceItem(DCM_PixelValueTransformationSequence, group, 0).good());
+    OFString intercept;
+    d.findAndGetOFString(DCM_RescaleIntercept, intercept);
+    put(*group, DCM_RescaleIntercept, intercept.c_str());
+    put(*group, DCM_RescaleSlope, "1");
+    for (const auto& tag :
+         {DCM_ImagePositionPatient, DCM_ImageOrientationPatient, DCM_PixelSpacing, DCM_RescaleIntercept, DCM_RescaleSlope}) {
+      d.findAndDeleteElement(tag);
+    }
+    put(d, DCM_NumberOfFrames, std::to_string(count));
+    put(d, DCM_SOPClassUID, UID_EnhancedCTImageStorage);
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+  });
+  const Imported frames = load(s.folder);
+  const Series classic("c21b", slices(0, count));
+  const Imported single = load(classic.folder);
+  EXPECT_TRUE(same_place(frames.image.frame, single.image.frame));
+  EXPECT_TRUE(std::equal(frames.image.span().begin(), frames.image.span().end(), single.image.span().begin()));
+  // Compressed: JPEG-LS over all frames.
+  DJLSEncoderRegistration::registerCodecs();
+  s.edit(
+      "000", [](DcmDataset&) {}, {}, EXS_JPEGLSLossless);
+  const Imported coded = load(s.folder);
+  EXPECT_TRUE(std::equal(coded.image.span().begin(), coded.image.span().end(), single.image.span().begin()));
+}
+
+TEST(HardCase, C22_SegmentationBesideTheCt) {
+  const auto seg = data("dicom_hard_files") / "liver_deflate.dcm";
+  NEEDS(seg);
+  Series s("c22", slices(0, 12));
+  fs::create_symlink(seg, s.folder / "seg.dcm");
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.image.frame.dims[2], 12);
+}
+
+TEST(HardCase, C23_PaddingIsAir) {
+  Series s("c23", slices(0, 12));
+  s.edit_all([](DcmDataset& d, int i) {
+    const Uint16* read = nullptr;
+    unsigned long count = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+    std::vector<Uint16> pixels(read, read + count);
+    Float64 intercept = 0;
+    d.findAndGetFloat64(DCM_RescaleIntercept, intercept);
+    // Signed, with -2000 in a corner as scanners do; the tag names it on even slices only, wrongly on odd ones.
+    for (auto& p : pixels) p = static_cast<Uint16>(static_cast<std::int16_t>(p + intercept + 1024));
+    for (int k = 0; k < 500; ++k) pixels[static_cast<std::size_t>(k)] = static_cast<Uint16>(-2000);
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+    d.putAndInsertUint16(DCM_PixelRepresentation, 1);
+    d.putAndInsertUint16(DCM_BitsStored, 16);
+    d.putAndInsertUint16(DCM_HighBit, 15);
+    put(d, DCM_RescaleIntercept, "-1024");
+    d.findAndDeleteElement(DCM_PixelPaddingValue);
+    ASSERT_TRUE(d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(i % 2 == 0 ? -2000 : -32768)).good());
+  });
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.verdict.values.padding_source, "tag and found");
+  EXPECT_TRUE(r.verdict.has(code::padding_tag));
+  EXPECT_TRUE(r.verdict.has(code::padding_found));
+  EXPECT_GE(*std::min_element(r.image.span().begin(), r.image.span().end()), -1024);
+  EXPECT_EQ(r.image.at(5, 0, 3), -1024);
+}
+
+TEST(HardCase, C24_WithoutPreambleAndMeta) {
+  Series s("c24", slices(0, 12));
+  s.edit_all([](DcmDataset&, int) {}, EXS_LittleEndianExplicit, EWM_dataset);
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.image.frame.dims[2], 12);
+  expect_every_slice_in_its_place(r.image, s.folder);
+  Series implicit("c24b", slices(0, 12));
+  implicit.edit_all([](DcmDataset&, int) {}, EXS_LittleEndianImplicit, EWM_dataset);
+  const Imported again = load(implicit.folder);
+  EXPECT_TRUE(std::equal(r.image.span().begin(), r.image.span().end(), again.image.span().begin()));
+  const auto cut = data("dicom_hard_files") / "no_meta.dcm";
+  if (!fs::exists(cut)) return;
+  try {
+    static_cast<void>(import_ct(cut, {}));
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("no_meta.dcm"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace osteo
