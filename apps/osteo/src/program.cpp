@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
@@ -16,6 +17,7 @@ cli::Program make_osteo_program() {
       "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
       "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
   p.registry.add<ImportStage>();
+  p.registry.add<ImportBoneStage>();
   p.registry.add<ThresholdStage>();
   p.registry.add<ResampleStage>();
   p.registry.add<SurfaceStage>();

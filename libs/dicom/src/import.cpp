@@ -57,7 +57,9 @@ Verdict judge_file(Image& image) {
   return v;
 }
 
-void tell(const Verdict& v, const Context& context) {
+}  // namespace
+
+void tell_verdict(const Verdict& v, const Context& context) {
   for (const Finding& f : v.findings) {
     if (f.severity == Severity::warning) context.warn(f.message + " [" + f.code + "]" + (f.advice.empty() ? "" : "; " + f.advice));
     if (f.severity == Severity::info) context.info(f.message + " [" + f.code + "]");
@@ -77,8 +79,6 @@ void tell(const Verdict& v, const Context& context) {
   context.report("hu_max", v.values.hu_max);
   context.report("looks_like_hu", v.values.plausible);
 }
-
-}  // namespace
 
 Imported import_ct(const fs::path& source, const ImportParams& params, const Context& context) {
   require_readable(source);
@@ -112,7 +112,7 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
     frame.origin_mm += centre - frame.centre_mm();
     result.verdict.output = frame;
   }
-  tell(result.verdict, context);
+  tell_verdict(result.verdict, context);
   return result;
 }
 

@@ -72,7 +72,7 @@ class Placer {
       const std::string why = verdict().set_aside[index_of(files.front())].why;
       verdict().add(code, Severity::warning,
                     (files.size() == 1 ? "'" + files.front() + "' is left out: "
-                                       : std::to_string(files.size()) + " files are left out, the first: ") +
+                                       : std::to_string(files.size()) + " files are left out, the first '" + files.front() + "': ") +
                         why,
                     "copy the files again from their source, or ask for the original export", files);
     }
@@ -405,7 +405,7 @@ class Placer {
     if (missing == 0) return;
     const bool refuse = widest > options_.max_hole_mm;
     v.add(refuse ? code::hole_too_wide : code::slices_missing, refuse ? Severity::error : Severity::warning,
-          (missing > 1 ? std::to_string(missing) + " slices are missing; at the widest place " : std::string()) + first_message +
+          (v.gaps.size() > 1 ? std::to_string(missing) + " slices are missing; at the widest place " : std::string()) + first_message +
               (refuse ? "; up to " + mm(options_.max_hole_mm) + " is interpolated" : "; the hole is interpolated"),
           "copy the missing files from their source" + std::string(refuse ? "; --max-hole-mm accepts wider holes" : ""), files);
   }

@@ -7,22 +7,32 @@ namespace osteo {
 Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
                                 Connectivity connectivity) {
   const auto nx = static_cast<std::uint32_t>(dims[0]);
-  const auto ny = static_cast<std::uint32_t>(dims[1]);
-  const auto rows = ny * static_cast<std::uint32_t>(dims[2]);
-  Components result;
-  std::vector<std::uint32_t> first(rows + 1);
+  const auto rows = static_cast<std::uint32_t>(dims[1]) * static_cast<std::uint32_t>(dims[2]);
+  std::vector<Run> runs;
   for (std::uint32_t row = 0; row < rows; ++row) {
-    first[row] = static_cast<std::uint32_t>(result.runs.size());
     const std::uint8_t* const p = mask.data() + static_cast<std::size_t>(row) * nx;
     for (std::uint32_t x = 0; x < nx;) {
       while (x < nx && p[x] != value) ++x;
       if (x == nx) break;
       const std::uint32_t begin = x;
       while (x < nx && p[x] == value) ++x;
-      result.runs.push_back({begin, x, row});
+      runs.push_back({begin, x, row});
     }
   }
-  first[rows] = static_cast<std::uint32_t>(result.runs.size());
+  return connected_components(std::move(runs), dims, connectivity);
+}
+
+Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, Connectivity connectivity) {
+  const auto ny = static_cast<std::uint32_t>(dims[1]);
+  const auto rows = ny * static_cast<std::uint32_t>(dims[2]);
+  Components result;
+  result.runs = std::move(runs);
+  std::vector<std::uint32_t> first(rows + 1);
+  std::uint32_t at = 0;
+  for (std::uint32_t row = 0; row <= rows; ++row) {
+    while (at < result.runs.size() && result.runs[at].row < row) ++at;
+    first[row] = at;
+  }
 
   std::vector<std::uint32_t> parent(result.runs.size());
   std::iota(parent.begin(), parent.end(), 0U);

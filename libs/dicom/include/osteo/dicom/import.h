@@ -31,6 +31,9 @@ struct Imported {
 /// load_image.
 [[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params, const Context& context = {});
 
+/// Warnings and facts of a verdict to log and report.
+void tell_verdict(const Verdict& verdict, const Context& context);
+
 struct ImportStage {
   using Params = ImportParams;
   static void describe(Params& p, auto& visit) {

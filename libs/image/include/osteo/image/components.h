@@ -31,4 +31,7 @@ struct Components {
 [[nodiscard]] Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
                                               Connectivity connectivity);
 
+/// The same for runs that are at hand, in scan order.
+[[nodiscard]] Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, Connectivity connectivity);
+
 }  // namespace osteo

@@ -1,0 +1,10 @@
+// The subjects of osteo_bench. Each prints tables in Markdown.
+#pragma once
+#include "osteo/base/context.h"
+
+namespace osteo {
+
+void bench_bone(const Context& context);    ///< resampling, surface, contact, removal
+void bench_import(const Context& context);  ///< DICOM to a volume
+
+}  // namespace osteo
