@@ -4,8 +4,8 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
-#include "osteo/image/phantom.h"
 #include "osteo/dicom/save_series.h"
+#include "osteo/image/phantom.h"
 
 namespace osteo {
 

@@ -7,8 +7,8 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
-#include "osteo/grid/brick_grid.h"
 #include "osteo/dicom/scan.h"
+#include "osteo/grid/brick_grid.h"
 #include "osteo/pipeline/formats.h"
 
 namespace osteo {

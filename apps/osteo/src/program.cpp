@@ -1,9 +1,9 @@
 #include "commands.h"
+#include "osteo/dicom/import.h"
 #include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
-#include "osteo/dicom/import.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/view/snapshot.h"
 
@@ -26,11 +26,13 @@ cli::Program make_osteo_program() {
   p.add<ListCommand>();
   p.add<InfoCommand>();
   p.add<SeriesCommand>();
+  p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
   p.add<DemoCommand>();
+  p.add<BenchCommand>();
   p.add<DocsCommand>();
   return p;
 }

@@ -1,16 +1,13 @@
-#include "rewrite.h"
-
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
-#include <dcmtk/oflog/oflog.h>
 
-#include <mutex>
+#include "dcmtk_tools.h"
+#include "rewrite.h"
 
 namespace osteo::dicom {
 
 std::string rewrite_plainly(const std::filesystem::path& from, const std::filesystem::path& to) {
-  static std::once_flag once;
-  std::call_once(once, [] { OFLog::configure(OFLogger::OFF_LOG_LEVEL); });
+  quiet_dcmtk();
   DcmFileFormat file;
   OFCondition status = file.loadFile(from.c_str(), EXS_Unknown, EGL_noChange, DCM_MaxReadLength, ERM_autoDetect);
   if (status.bad()) return status.text();

@@ -216,21 +216,22 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
 }
 
 StageInfo ImportBoneStage::info() {
-  return {.name = "import-bone",
-          .version = 1,
-          .synopsis = "DICOM straight to sparse bone, without the volume in memory",
-          .description =
-              "Reads slices a few at a time, places each by its own position and samples isotropic voxels between them in one pass: a tilted "
-              "or uneven series is interpolated once instead of twice, and a scan of any length needs little memory. Thresholds and drops "
-              "small pieces on the way. 'import', 'threshold' and 'resample' do the same in steps with more choices.",
-          .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, file or zip"}},
-          .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
-                      {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true},
-                      {"valid", {DataKind::grid}, "where the scan measured at all", true},
-                      {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
-          .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module",
-                         "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
-          .example = "osteo import-bone DICOM_FOLDER bone.vdb --lower 300 --spacing-mm 0.5"};
+  return {
+      .name = "import-bone",
+      .version = 1,
+      .synopsis = "DICOM straight to sparse bone, without the volume in memory",
+      .description =
+          "Reads slices a few at a time, places each by its own position and samples isotropic voxels between them in one pass: a tilted "
+          "or uneven series is interpolated once instead of twice, and a scan of any length needs little memory. Thresholds and drops "
+          "small pieces on the way. 'import', 'threshold' and 'resample' do the same in steps with more choices.",
+      .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, file or zip"}},
+      .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
+                  {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true},
+                  {"valid", {DataKind::grid}, "where the scan measured at all", true},
+                  {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
+      .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module",
+                     "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
+      .example = "osteo import-bone DICOM_FOLDER bone.vdb --lower 300 --spacing-mm 0.5"};
 }
 
 std::vector<Data> ImportBoneStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {

@@ -120,6 +120,7 @@ RawVolume read_nrrd(const fs::path& path) {
   const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!all.starts_with("NRRD")) fail(path, "this is not an NRRD file");
   std::map<std::string, std::string, std::less<>> fields;
+  std::map<std::string, std::string> notes;
   std::size_t at = all.find('\n');
   bool detached = true;
   while (at != std::string_view::npos && ++at < all.size()) {
@@ -134,7 +135,10 @@ RawVolume read_nrrd(const fs::path& path) {
     if (line.starts_with('#')) continue;
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos) fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
-    if (line.substr(colon).starts_with(":=")) continue;
+    if (line.substr(colon).starts_with(":=")) {
+      notes[std::string(line.substr(0, colon))] = std::string(line.substr(colon + 2));
+      continue;
+    }
     std::string_view value = line.substr(colon + 1);
     while (value.starts_with(' ') || value.starts_with('\t')) value.remove_prefix(1);
     fields[lower(std::string(line.substr(0, colon)))] = std::string(value);
@@ -145,10 +149,19 @@ RawVolume read_nrrd(const fs::path& path) {
   };
 
   RawVolume raw;
+  raw.notes = std::move(notes);
   const auto type = kTypes.find(get("type"));
   if (type == kTypes.end()) fail(path, "the scalar type '" + get("type") + "' is not supported");
   raw.type = type->second;
-  const auto sizes = numbers_in(get("sizes"));
+  auto sizes = numbers_in(get("sizes"));
+  const std::string kinds = lower(get("kinds"));
+  if (sizes.size() == 4 && (kinds.starts_with("list ") || kinds.starts_with("vector "))) {
+    if (!(sizes[0] >= 1 && sizes[0] <= 255)) fail(path, "it has " + format_number(sizes[0]) + " layers");
+    raw.layers = static_cast<int>(sizes[0]);
+    sizes.erase(sizes.begin());
+    std::string& directions = fields["space directions"];
+    if (directions.starts_with("none")) directions.erase(0, 4);
+  }
   if (sizes.size() != 3) fail(path, "it has " + std::to_string(sizes.size()) + " axes; a volume has three");
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(sizes[a] >= 1 && sizes[a] <= 65536)) fail(path, "the size " + format_number(sizes[a]) + " is out of range");
@@ -184,7 +197,7 @@ RawVolume read_nrrd(const fs::path& path) {
     throw e.in("'" + path.string() + "'");
   }
 
-  const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar;
+  const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
   std::vector<std::byte> apart;
   std::span<const std::byte> body;
   std::string data_file = get("data file");
@@ -229,7 +242,9 @@ void write_nrrd(const RawVolume& raw, const fs::path& path) {
     header << " (" << v.x << ',' << v.y << ',' << v.z << ')';
   }
   header << "\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: (" << f.origin_mm.x << ',' << f.origin_mm.y << ','
-         << f.origin_mm.z << ")\n\n";
+         << f.origin_mm.z << ")\n";
+  for (const auto& [key, value] : raw.notes) header << key << ":=" << value << '\n';
+  header << '\n';
   static_assert(std::endian::native == std::endian::little);
   const std::size_t size = f.voxel_count() * size_of(raw.type);
   // Level 1: a CT shrinks nearly as much as at level 6, in a quarter of the time.

@@ -1,5 +1,7 @@
 #include "raw_volume.h"
 
+#include "seg_notes.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -63,6 +65,7 @@ std::size_t size_of(Scalar type) {
 
 Image image_from(const RawVolume& raw, const Context& context) {
   require_valid(raw.frame);
+  if (raw.layers != 1) throw Error(ExitCode::corrupt, "it holds several layers: a label map, not a CT");
   const std::size_t n = raw.frame.voxel_count();
   if (raw.type == Scalar::i16) {
     auto shared = std::static_pointer_cast<const std::int16_t>(raw.data);
@@ -91,12 +94,49 @@ Image image_from(const RawVolume& raw, const Context& context) {
   return {raw.frame, out};
 }
 
-Labels labels_from(const RawVolume& raw) {
+namespace {
+
+// Segments of several layers get values of their own; where they overlap, the later one stays.
+Labels merge_layers(const RawVolume& raw, const std::vector<SegmentNote>& segments, const Context& context) {
+  if (segments.empty()) throw Error(ExitCode::corrupt, "it holds several layers but names no segments");
+  if (segments.size() > 255)
+    throw Error(ExitCode::corrupt, "it holds " + std::to_string(segments.size()) + " segments; up to 255 are supported");
+  const std::size_t n = raw.frame.voxel_count(), layers = static_cast<std::size_t>(raw.layers);
+  const auto out = make_voxels<std::uint8_t>(n);
+  std::fill_n(out.get(), n, std::uint8_t{0});
+  std::vector<Structure> structures;
+  std::size_t overlap = 0;
+  visit_scalars(raw, [&](const auto* p) {
+    for (std::size_t s = 0; s < segments.size(); ++s) {
+      const auto layer = static_cast<std::size_t>(segments[s].layer);
+      if (layer >= layers) throw Error(ExitCode::corrupt, "segment '" + segments[s].structure.name + "' is in a layer that is not there");
+      Structure named = segments[s].structure;
+      for (std::size_t i = 0; i < n; ++i) {
+        if (static_cast<double>(p[i * layers + layer]) != named.value) continue;
+        overlap += out[i] != 0 ? 1 : 0;
+        out[i] = static_cast<std::uint8_t>(s + 1);
+      }
+      named.value = static_cast<std::uint8_t>(s + 1);
+      structures.push_back(std::move(named));
+    }
+  });
+  if (overlap > 0) context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");
+  return {{raw.frame, out}, structures};
+}
+
+}  // namespace
+
+Labels labels_from(const RawVolume& raw, const Context& context) {
   require_valid(raw.frame);
+  const auto segments = segments_from(raw.notes);
+  if (raw.layers != 1) return merge_layers(raw, segments, context);
+  std::vector<Structure> structures;
+  for (const SegmentNote& s : segments) structures.push_back(s.structure);
+  std::stable_sort(structures.begin(), structures.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
   const std::size_t n = raw.frame.voxel_count();
   if (raw.type == Scalar::u8) {
     auto shared = std::static_pointer_cast<const std::uint8_t>(raw.data);
-    return {raw.frame, std::shared_ptr<const std::uint8_t[]>(shared, shared.get())};
+    return {{raw.frame, std::shared_ptr<const std::uint8_t[]>(shared, shared.get())}, structures};
   }
   const auto out = make_voxels<std::uint8_t>(n);
   visit_scalars(raw, [&](const auto* p) {
@@ -109,7 +149,7 @@ Labels labels_from(const RawVolume& raw) {
       out[i] = static_cast<std::uint8_t>(v);
     }
   });
-  return {raw.frame, out};
+  return {{raw.frame, out}, structures};
 }
 
 }  // namespace osteo::io

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -17,13 +18,15 @@ enum class Scalar { u8, i8, u16, i16, u32, i32, f32, f64 };
 struct RawVolume {
   Frame frame;
   Scalar type = Scalar::i16;
-  std::shared_ptr<const void> data;  ///< frame.voxel_count() scalars in machine byte order, x fastest
+  std::shared_ptr<const void> data;          ///< frame.voxel_count() * layers scalars in machine byte order, layer fastest, then x
+  int layers = 1;                            ///< label maps of 3D Slicer may hold several that overlap
+  std::map<std::string, std::string> notes;  ///< key:=value lines of NRRD
 };
 
 /// Values are rounded to whole HU. Error(corrupt) when they are not finite, or too small in range to be HU.
 [[nodiscard]] Image image_from(const RawVolume& raw, const Context& context);
 /// Error(corrupt) when a value is not a whole number from 0 to 255.
-[[nodiscard]] Labels labels_from(const RawVolume& raw);
+[[nodiscard]] Labels labels_from(const RawVolume& raw, const Context& context = {});
 
 [[nodiscard]] RawVolume read_nrrd(const std::filesystem::path& path);
 [[nodiscard]] RawVolume read_nifti(const std::filesystem::path& path, const Context& context);

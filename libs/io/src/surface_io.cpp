@@ -3,14 +3,12 @@
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkOBJReader.h>
-#include <vtkOBJWriter.h>
 #include <vtkPLYReader.h>
 #include <vtkPNGReader.h>
 #include <vtkPNGWriter.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
-#include <vtkSTLWriter.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
@@ -18,32 +16,10 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/io/vtk_data.h"
-#include "vtk_volume.h"
+#include "surface_text.h"
 
 namespace osteo {
 namespace {
-
-constexpr const char* kHeader = "Osteotome; LPS; mm";
-
-// Binary PLY, made here: vtkPLYWriter does not look whether its bytes reach the disk.
-std::string ply_text(const TriMesh& mesh) {
-  const bool normals = mesh.normals.size() == mesh.points_mm.size();
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment " + std::string(kHeader) + "\nelement vertex " +
-                     std::to_string(mesh.points_mm.size()) + "\nproperty float x\nproperty float y\nproperty float z\n" +
-                     (normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") + "element face " +
-                     std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
-  const auto append = [&](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  text.reserve(text.size() + mesh.points_mm.size() * (normals ? 24 : 12) + mesh.triangles.size() * 13);
-  for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
-    append(mesh.points_mm[p]);
-    if (normals) append(mesh.normals[p]);
-  }
-  for (const auto& t : mesh.triangles) {
-    append(std::uint8_t{3});
-    append(t);
-  }
-  return text;
-}
 
 template <class Reader>
 vtkSmartPointer<vtkPolyData> read_with(const fs::path& path) {
@@ -94,24 +70,18 @@ Surface load_surface(const fs::path& path) {
 }
 
 void save_surface(const TriMesh& mesh, const fs::path& path) {
-  const auto poly = to_vtk(mesh);
   const auto e = path.extension();
-  if (e == ".ply") {
-    write_file(path, ply_text(mesh));
-  } else if (e == ".stl") {
-    vtkNew<vtkSTLWriter> writer;
-    writer->SetFileTypeToBinary();
-    writer->SetHeader(kHeader);
-    write_with(writer.Get(), poly, path);
-  } else if (e == ".obj") {
-    vtkNew<vtkOBJWriter> writer;
-    write_with(writer.Get(), poly, path);
-  } else if (e == ".vtp") {
+  if (e == ".ply") return write_file(path, io::ply_text(mesh));
+  if (e == ".stl") return write_file(path, stl_text(mesh));
+  if (e == ".glb") return write_file(path, io::glb_text(mesh));
+  if (e == ".3mf") return write_atomically(path, [&](const fs::path& temporary) { io::write_3mf(mesh, temporary, path); });
+  if (e == ".obj") return write_file(path, io::obj_text(mesh));
+  if (e == ".vtp") {
     vtkNew<vtkXMLPolyDataWriter> writer;
-    write_with(writer.Get(), poly, path);
-  } else {
-    throw Error(ExitCode::usage, "cannot write a surface as '" + path.filename().string() + "'", "name it .ply, .stl, .obj or .vtp");
+    return write_with(writer.Get(), to_vtk(mesh), path);
   }
+  throw Error(ExitCode::usage, "cannot write a surface as '" + path.filename().string() + "'",
+              "name it .ply, .stl, .obj, .glb, .3mf or .vtp");
 }
 
 void save_picture(const Picture& picture, const fs::path& path) {

@@ -6,6 +6,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "raw_volume.h"
+#include "seg_notes.h"
 
 namespace osteo {
 namespace {
@@ -56,12 +57,17 @@ auto in_file(const fs::path& path, F&& convert) {
 }
 
 template <class T>
-void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path) {
+void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path, std::map<std::string, std::string> notes = {}) {
   const Format* const format = format_of(path);
   if (format == nullptr || format->write == nullptr) {
     throw Error(ExitCode::usage, "cannot write a volume as '" + path.filename().string() + "'", "name it .nrrd, .nii.gz, .mha or .vti");
   }
-  format->write({volume.frame, type, std::shared_ptr<const void>(volume.voxels, volume.voxels.get())}, path);
+  io::RawVolume raw;
+  raw.frame = volume.frame;
+  raw.type = type;
+  raw.data = std::shared_ptr<const void>(volume.voxels, volume.voxels.get());
+  raw.notes = std::move(notes);
+  format->write(raw, path);
 }
 
 }  // namespace
@@ -73,11 +79,11 @@ Image load_image(const fs::path& path, const Context& context) {
   return in_file(path, [&, raw = load_raw(path, context)] { return io::image_from(raw, context); });
 }
 Labels load_labels(const fs::path& path, const Context& context) {
-  return in_file(path, [raw = load_raw(path, context)] { return io::labels_from(raw); });
+  return in_file(path, [&, raw = load_raw(path, context)] { return io::labels_from(raw, context); });
 }
 std::variant<Image, Labels> load_volume(const fs::path& path, const Context& context) {
   return in_file(path, [&, raw = load_raw(path, context)]() -> std::variant<Image, Labels> {
-    if (raw.type == io::Scalar::u8) return io::labels_from(raw);
+    if (raw.type == io::Scalar::u8 || raw.layers > 1) return io::labels_from(raw, context);
     return io::image_from(raw, context);
   });
 }
@@ -85,7 +91,8 @@ void save_image(const Image& image, const fs::path& path) {
   save_volume(image, io::Scalar::i16, path);
 }
 void save_labels(const Labels& labels, const fs::path& path) {
-  save_volume(labels, io::Scalar::u8, path);
+  const bool named = !labels.structures.empty() || path.filename().string().ends_with(".seg.nrrd");
+  save_volume(labels, io::Scalar::u8, path, named ? io::notes_from(labels) : std::map<std::string, std::string>{});
 }
 
 }  // namespace osteo

@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/dicom/objects.h"
 #include "osteo/dicom/save_series.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
@@ -19,9 +20,9 @@ struct Suffixes {
   std::string_view writable;
 };
 constexpr std::array<Suffixes, 6> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
-                                             {DataKind::labels, ".nrrd .nii .nii.gz .mha .vti"},
+                                             {DataKind::labels, ".seg.nrrd .nrrd .nii .nii.gz .mha .vti .dcm"},
                                              {DataKind::grid, ".vdb"},
-                                             {DataKind::surface, ".ply .stl .obj .vtp"},
+                                             {DataKind::surface, ".ply .stl .obj .glb .3mf .vtp .dcm"},
                                              {DataKind::picture, ".png"},
                                              {DataKind::document, ".json"}}};
 
@@ -65,6 +66,7 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
                 "'osteo import FOLDER ct.nrrd' reads a folder of DICOM files");
   }
   const bool image = accepts(accepted, DataKind::image), labels = accepts(accepted, DataKind::labels);
+  if (labels && !is_volume_file(path) && is_segmentation(path)) return load_segmentation(path, context);
   if (!image && !labels) {
     if (is_volume_file(path)) throw wrong(DataKind::image);
     throw Error(ExitCode::usage, "'" + path.string() + "' is no " + kinds_text(accepted) + " by its name");
@@ -72,8 +74,7 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   if (image && labels) {
     return std::visit([](auto&& volume) -> Data { return volume; }, load_volume(path, context));
   }
-  if (labels) return load_labels(path, context);
-  return load_image(path, context);
+  return labels ? Data(load_labels(path, context)) : Data(load_image(path, context));
 }
 
 void require_savable(DataKind kind, const fs::path& path) {
@@ -103,13 +104,21 @@ void save_data(const Data& data, const fs::path& path, const Context& context) {
       }
       return;
     case DataKind::labels:
-      save_labels(std::get<Labels>(data), path);
+      if (path.extension() == ".dcm") {
+        save_segmentation(std::get<Labels>(data), path);
+      } else {
+        save_labels(std::get<Labels>(data), path);
+      }
       return;
     case DataKind::grid:
       save_grid(std::get<SparseGrid>(data), path);
       return;
     case DataKind::surface:
-      save_surface(*std::get<Surface>(data), path);
+      if (path.extension() == ".dcm") {
+        save_encapsulated_stl(*std::get<Surface>(data), path);
+      } else {
+        save_surface(*std::get<Surface>(data), path);
+      }
       return;
     case DataKind::picture:
       save_picture(std::get<Picture>(data), path);

@@ -1,8 +1,11 @@
 // A dense block of voxels. A value: copies share the voxels, which nobody changes once the volume is made.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "osteo/data/frame.h"
 
@@ -24,8 +27,17 @@ struct Volume {
 
 /// CT in Hounsfield units, rounded to whole HU.
 using Image = Volume<std::int16_t>;
+/// What a value of a label map stands for.
+struct Structure {
+  std::uint8_t value = 1;
+  std::string name;                            ///< "facial nerve"; never empty
+  std::array<std::uint8_t, 3> rgb{0, 0, 0};    ///< black: none was given
+  friend bool operator==(const Structure&, const Structure&) = default;
+};
 /// 0 is background; a mask has only 1 besides; a label map has one value a structure.
-using Labels = Volume<std::uint8_t>;
+struct Labels : Volume<std::uint8_t> {
+  std::vector<Structure> structures{};  ///< in order of their values; empty when the file named none
+};
 
 /// Trilinear between voxel centres at a point in index coordinates; outside, the value at the border.
 [[nodiscard]] double sample_linear(const Image& image, Vec3 index);
