@@ -1,8 +1,10 @@
 #include "osteo/image/threshold.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
+#include "clean.h"
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
 #include "osteo/image/distance.h"
@@ -78,7 +80,23 @@ void drop_small_pieces(std::uint8_t* mask, const Frame& frame, const ThresholdPa
 
 }  // namespace
 
-Labels threshold(const Image& ct, const ThresholdParams& p, const Context& context) {
+Labels threshold(const Image& ct, const ThresholdParams& given, const Context& context) {
+  ThresholdParams p = given;
+  if (p.preset != BonePreset::fixed) {
+    const BoneGuide guide = guide_threshold(ct, context.threads);
+    const PresetGuide& chosen = guide.presets[static_cast<std::size_t>(p.preset) - 1];
+    p.lower = chosen.lower_hu;
+    context.report("soft_tissue_hu", guide.soft_tissue_hu);
+    context.report("dense_bone_hu", guide.dense_bone_hu);
+    context.report("confidence", guide.confidence);
+    context.report("change_percent_per_50_hu", chosen.change_percent);
+    if (guide.confidence < 0.5) {
+      context.warn("bone and tissue are hard to tell apart in this scan (confidence " +
+                   format_number(std::round(guide.confidence * 100) / 100) + "): look at the mask before you rely on " +
+                   format_number(p.lower) + " HU");
+    }
+  }
+  context.report("lower_hu", p.lower);
   if (p.lower > p.upper) {
     throw Error(ExitCode::usage, "--lower " + format_number(p.lower) + " HU is above --upper " + format_number(p.upper) + " HU");
   }
@@ -87,6 +105,18 @@ Labels threshold(const Image& ct, const ThresholdParams& p, const Context& conte
   parallel_for(n, kGrain, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) mask[i] = ct.voxels[i] >= p.lower && ct.voxels[i] <= p.upper ? 1 : 0;
   });
+  if (p.remove_table) {
+    context.progress(0.1, "body");
+    const std::size_t cleared = image::clear_outside_body(mask.get(), ct, context.sub(0.1, 0.15));
+    context.report("outside_body_mm3", static_cast<double>(cleared) * ct.frame.voxel_volume_mm3());
+  }
+  if (p.metal_mm > 0) {
+    std::size_t metal = 0;
+    const std::size_t cleared =
+        image::clear_streaks(mask.get(), ct, p.metal_mm, p.metal_hu, std::max(p.metal_lower, p.lower), metal, context.sub(0.15, 0.2));
+    context.report("metal_mm3", static_cast<double>(metal) * ct.frame.voxel_volume_mm3());
+    context.report("streaks_mm3", static_cast<double>(cleared) * ct.frame.voxel_volume_mm3());
+  }
   context.progress(0.2, "components");
   if (p.core > p.lower) keep_cored_pieces(mask.get(), ct, p.core, p.connectivity);
   if (p.close_mm > 0) close_gaps(mask.get(), ct.frame, p.close_mm, context);
@@ -105,16 +135,19 @@ Labels threshold(const Image& ct, const ThresholdParams& p, const Context& conte
 }
 
 StageInfo ThresholdStage::info() {
-  return {.name = "threshold",
-          .version = 1,
-          .synopsis = "bone mask from a CT by Hounsfield units",
-          .description =
-              "Marks the voxels between two HU values, then cleans the mask: hysteresis, closing, filling of cavities, and "
-              "removal of small pieces, each off unless asked for except the last.",
-          .inputs = {{"image", {DataKind::image}, "CT in HU"}},
-          .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1"},
-          .example = "osteo threshold ct.nrrd bone.nrrd --lower 250 --core 500"};
+  return {
+      .name = "threshold",
+      .version = 2,
+      .synopsis = "bone mask from a CT by Hounsfield units",
+      .description =
+          "Marks the voxels between two HU values, then cleans the mask: table and head holder, streaks near metal, hysteresis, closing, "
+          "filling of cavities, and removal of small pieces, each off unless asked for except the last. With --preset the lower value "
+          "is found from the scan: cortical for thick bone, cellular for the mastoid's walls, thin for the orbit's.",
+      .inputs = {{"image", {DataKind::image}, "CT in HU"}},
+      .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
+                     "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. Med. Biol. 1999"},
+      .example = "osteo threshold ct.nrrd bone.nrrd --lower 250 --core 500"};
 }
 
 std::vector<Data> ThresholdStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {

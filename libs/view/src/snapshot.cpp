@@ -1,11 +1,13 @@
 #include "osteo/view/snapshot.h"
 
 #include <vtkActor.h>
+#include <vtkCellArray.h>
 #include <vtkFlyingEdges3D.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkImageConstantPad.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkRenderer.h>
 
@@ -83,8 +85,19 @@ std::pair<Vec3, Vec3> bounds_of(const Data& data) {
   return {lo, hi};
 }
 
-// Isosurface of a dense volume, closed at its border.
-vtkSmartPointer<vtkPolyData> isosurface(vtkImageData* image, double value, double outside) {
+// Isosurface of a dense volume, closed at its border. Made in voxel indices and placed here: VTK 9.1's filters drop the direction.
+template <class T>
+vtkSmartPointer<vtkPolyData> isosurface(const Volume<T>& volume, double value, double outside) {
+  Volume<T> upright = volume;
+  upright.frame.origin_mm = {};
+  upright.frame.spacing_mm = {1, 1, 1};
+  upright.frame.direction = {};
+  vtkSmartPointer<vtkImageData> image;
+  if constexpr (std::is_same_v<T, std::uint8_t>) {
+    image = to_vtk(Labels{{upright.frame, upright.voxels}, {}});
+  } else {
+    image = to_vtk(upright);
+  }
   vtkNew<vtkImageConstantPad> pad;
   int e[6];
   image->GetExtent(e);
@@ -98,7 +111,23 @@ vtkSmartPointer<vtkPolyData> isosurface(vtkImageData* image, double value, doubl
   edges->ComputeGradientsOff();
   edges->ComputeNormalsOn();
   edges->Update();
-  return edges->GetOutput();
+  vtkPolyData* const surface = edges->GetOutput();
+  const Frame& f = volume.frame;
+  vtkDataArray* const normals = surface->GetPointData()->GetNormals();
+  for (vtkIdType p = 0; p < surface->GetNumberOfPoints(); ++p) {
+    double x[3];
+    surface->GetPoint(p, x);
+    const Vec3 world = f.world_from_index({x[0], x[1], x[2]});
+    surface->GetPoints()->SetPoint(p, world.x, world.y, world.z);
+    if (normals == nullptr) continue;
+    normals->GetTuple(p, x);
+    const Vec3 n = normalized(f.direction * Vec3{x[0] / f.spacing_mm.x, x[1] / f.spacing_mm.y, x[2] / f.spacing_mm.z});
+    normals->SetTuple3(p, n.x, n.y, n.z);
+  }
+  if (determinant(f.direction) < 0) {
+    for (vtkIdType c = 0; c < surface->GetNumberOfPolys(); ++c) surface->GetPolys()->ReverseCellAtId(c);
+  }
+  return surface;
 }
 
 vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
@@ -108,8 +137,8 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
       return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
     }
-    if (const auto* labels = std::get_if<Labels>(data)) return isosurface(to_vtk(*labels), 0.5, 0);
-    if (const auto* image = std::get_if<Image>(data)) return isosurface(to_vtk(*image), p.bone_hu, -1024);
+    if (const auto* labels = std::get_if<Labels>(data)) return isosurface<std::uint8_t>(*labels, 0.5, 0);
+    if (const auto* image = std::get_if<Image>(data)) return isosurface<std::int16_t>(*image, p.bone_hu, -1024);
     if (const auto* grid = std::get_if<SparseGrid>(data)) {
       return to_vtk(surface_nets(to_bricks(*grid), static_cast<float>(p.bone_hu), context).mesh);
     }
