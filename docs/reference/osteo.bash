@@ -2,33 +2,43 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import threshold resample surface snapshot phantom list info series run prepare rehearse replay demo docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface snapshot structures phantom list info series guide convert run prepare rehearse replay demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
+    "crop --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
+    "threshold --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
+    "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
+    "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
   case "${COMP_WORDS[1]}" in
     import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --axes --verdict-out" ;;
-    threshold) flags="$flags --xml --describe --lower --upper --core --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
+    import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-out --valid-out --verdict-out" ;;
+    crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
+    threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
-    snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --title --mask --surface" ;;
+    snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
+    structures) flags="$flags --xml --describe --names --image" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --seed --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
     series) flags="$flags" ;;
+    guide) flags="$flags" ;;
+    convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
-    prepare) flags="$flags --out --lower --spacing-mm --series --axes --pipeline" ;;
+    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --side --seconds --rate-hz --fast --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     demo) flags="$flags --out --seconds --axes" ;;
+    bench) flags="$flags" ;;
     docs) flags="$flags --check" ;;
   esac
   case "$cur" in

@@ -4,6 +4,8 @@
 
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
+#include "osteo/image/bone_threshold.h"
+#include "osteo/image/crop.h"
 
 namespace osteo {
 
@@ -22,6 +24,13 @@ struct InfoCommand {
 };
 
 struct SeriesCommand {
+  struct Params {};
+  static void describe(Params&, auto&) {}
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct GuideCommand {
   struct Params {};
   static void describe(Params&, auto&) {}
   static cli::CommandInfo info();
@@ -79,17 +88,27 @@ struct DocsCommand {
 struct PrepareCommand {
   struct Params {
     std::string out;
+    BonePreset preset = BonePreset::fixed;
     double lower = 300;
     double spacing_mm = 0.5;
+    Region region = Region::whole;
+    bool remove_table = false;
+    std::string structures;
+    std::string names;
     std::string series;
     std::string axes;
     std::string pipeline;
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the case, made when it is not there (also -o)"}, p.out);
+    visit({"preset", "how the bone threshold is found: fixed takes --lower, the others go by the scan ('osteo guide')"}, p.preset);
     visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
     visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
-    visit({"series", "DICOM series to take, by number or UID (empty: the one with the most slices)"}, p.series);
+    visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);
+    visit({"remove_table", "clear table and head holder"}, p.remove_table);
+    visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"}, p.structures);
+    visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'"}, p.names);
+    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
   }

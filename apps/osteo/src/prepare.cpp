@@ -28,14 +28,17 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   if (fs::exists(folder) && !fs::is_directory(folder))
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is a file, not a folder");
   const bool is_new = !fs::exists(folder);
-  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") &&
+  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") && !fs::exists(folder / "import.json") &&
       !io.common.force) {
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case",
                 "give another name, or --force to write into it");
   }
   std::map<std::string, std::string> settings{{"source", io.arguments[0]},
                                               {"case", folder.string()},
+                                              {"preset", std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(p.preset)])},
                                               {"lower", format_number(p.lower)},
+                                              {"region", std::string(EnumNames<Region>::values[static_cast<std::size_t>(p.region)])},
+                                              {"remove_table", p.remove_table ? "true" : "false"},
                                               {"spacing_mm", format_number(p.spacing_mm)},
                                               {"series", p.series},
                                               {"axes", p.axes}};
@@ -43,6 +46,18 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   const std::string text = p.pipeline.empty() ? std::string(kTemporalBonePipeline) : read_text(p.pipeline);
   Pipeline pipeline = parse_pipeline(text, settings);
   const std::string name = pipeline.name;
+  if (!p.structures.empty()) {
+    PipelineNode node;
+    node.id = node.stage = "structures";
+    node.inputs["labels"].file = p.structures;
+    node.inputs["image"].node = "ct";
+    node.params["names"] = p.names;
+    node.outputs["structures"] = folder / "structures.seg.nrrd";
+    pipeline.nodes.push_back(std::move(node));
+    for (PipelineNode& n : pipeline.nodes) {
+      if (n.id == "preview") n.inputs["mask"].node = "structures";
+    }
+  }
   validate(pipeline, io.registry);
 
   std::error_code ec;
@@ -57,8 +72,12 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     io.end_progress();
     cli::print_results(results, io);
   } catch (...) {
-    // A folder that was made for nothing goes again.
-    if (is_new && fs::is_empty(folder)) fs::remove(folder, ec);
+    // A folder that was made for nothing goes again; the verdict on a refused scan stays.
+    const fs::path verdict = folder / "import.json";
+    const bool refused = fs::exists(verdict) && !fs::exists(provenance_path(verdict));
+    if (is_new && !refused && !fs::exists(folder / "bone.vdb")) fs::remove_all(folder, ec);
+    io.end_progress();
+    if (refused && !io.common.quiet) io.err << "what was found is in " << verdict.string() << '\n';
     throw;
   }
   if (!io.common.quiet) {

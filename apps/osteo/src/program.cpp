@@ -2,7 +2,9 @@
 #include "osteo/dicom/import.h"
 #include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
+#include "osteo/image/crop.h"
 #include "osteo/image/phantom.h"
+#include "osteo/image/structures.h"
 #include "osteo/image/threshold.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/view/snapshot.h"
@@ -18,14 +20,17 @@ cli::Program make_osteo_program() {
       "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
   p.registry.add<ImportStage>();
   p.registry.add<ImportBoneStage>();
+  p.registry.add<CropStage>();
   p.registry.add<ThresholdStage>();
   p.registry.add<ResampleStage>();
   p.registry.add<SurfaceStage>();
   p.registry.add<SnapshotStage>();
+  p.registry.add<StructuresStage>();
   p.registry.add<PhantomStage>();
   p.add<ListCommand>();
   p.add<InfoCommand>();
   p.add<SeriesCommand>();
+  p.add<GuideCommand>();
   p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();

@@ -21,6 +21,25 @@ constexpr float kForcedHu = 100;
 
 constexpr float kTrace = 1.0F / 256;
 
+// The threshold that the mask looks most like: the highest at which the fewest voxels differ from it.
+double lower_of_mask(const Image& ct, const Labels& mask) {
+  constexpr int kLow = -32768, kCount = 65536;
+  std::vector<std::int64_t> balance(kCount);  // of each value: voxels in the mask less voxels outside
+  for (std::size_t i = 0; i < ct.frame.voxel_count(); ++i)
+    balance[static_cast<std::size_t>(ct.voxels[i] - kLow)] += mask.voxels[i] != 0 ? 1 : -1;
+  // Raising the threshold past a value loses its mask voxels and is rid of its others.
+  std::int64_t wrong = 0, best = 0;
+  int at = kLow;
+  for (int v = 0; v + 1 < kCount; ++v) {
+    wrong += balance[static_cast<std::size_t>(v)];
+    if (wrong < best || (wrong == best && balance[static_cast<std::size_t>(v)] == 0 && at == v + kLow)) {
+      best = wrong;
+      at = v + 1 + kLow;
+    }
+  }
+  return at;
+}
+
 // HU above the boundary, negative outside bone.
 std::vector<float> signed_field(const Image& ct, const Labels& mask, double lower) {
   std::vector<float> field(ct.frame.voxel_count());
@@ -268,9 +287,14 @@ double find_offset(const Resampler& resampler, double wanted_mm3, const Context&
 
 }  // namespace
 
-ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& p, const Context& context) {
+ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& given, const Context& context) {
   if (!same_place(ct.frame, mask.frame)) {
     throw Error(ExitCode::usage, "the mask does not lie on the voxels of the CT", "make the mask from this CT with 'osteo threshold'");
+  }
+  ResampleParams p = given;
+  if (p.lower == 0) {
+    p.lower = lower_of_mask(ct, mask);
+    context.report("lower_hu", p.lower);
   }
   double voxels = 1;
   for (std::size_t a = 0; a < 3; ++a) voxels *= std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm);
@@ -352,7 +376,7 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
 
 StageInfo ResampleStage::info() {
   return {.name = "resample",
-          .version = 2,
+          .version = 3,
           .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
           .description =
               "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "

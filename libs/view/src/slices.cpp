@@ -50,9 +50,15 @@ double grey_of_hu(double hu) {
   return std::clamp((hu + 200) / 1700 * 255, 0.0, 255.0);
 }
 
-Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label) {
+Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label, const std::vector<Structure>& structures) {
   Picture picture{view.width, view.height, {}};
   picture.rgb.resize(static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height) * 3);
+  std::array<std::array<double, 3>, 256> tints{};
+  for (std::size_t v = 1; v < tints.size(); ++v) tints[v] = kTints[(v - 1) % kTints.size()];
+  for (const Structure& s : structures) {
+    for (std::size_t c = 0; c < 3; ++c) tints[s.value][c] = s.rgb[c];
+  }
+  const double strength = structures.empty() ? 0.4 : 0.75;
   std::size_t at = 0;
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) {
@@ -60,8 +66,8 @@ Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& lab
       const double g = grey ? grey(p) : 0;
       std::array<double, 3> rgb{g, g, g};
       if (const int l = label ? label(p) : 0; l > 0) {
-        const auto& tint = kTints[static_cast<std::size_t>(l - 1) % kTints.size()];
-        for (std::size_t c = 0; c < 3; ++c) rgb[c] = 0.6 * rgb[c] + 0.4 * tint[c];
+        const auto& tint = tints[static_cast<std::size_t>(l) & 255];
+        for (std::size_t c = 0; c < 3; ++c) rgb[c] = (1 - strength) * rgb[c] + strength * tint[c];
       }
       for (const double c : rgb) picture.rgb[at++] = static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0, 255.0)));
     }

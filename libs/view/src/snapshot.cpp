@@ -9,6 +9,7 @@
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
+#include <vtkProperty.h>
 #include <vtkRenderer.h>
 
 #include <algorithm>
@@ -130,9 +131,28 @@ vtkSmartPointer<vtkPolyData> isosurface(const Volume<T>& volume, double value, d
   return surface;
 }
 
+const std::vector<Structure>& structures_of(const SnapshotSubjects& s) {
+  static const std::vector<Structure> none;
+  for (const Data* data : {&s.mask, &s.subject}) {
+    if (const auto* labels = std::get_if<Labels>(data); labels != nullptr && !labels->structures.empty()) return labels->structures;
+  }
+  return none;
+}
+
+vtkSmartPointer<vtkActor> structure_actor(const Labels& labels, const Structure& structure) {
+  const auto only = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (std::size_t i = 0; i < labels.frame.voxel_count(); ++i) only[i] = labels.voxels[i] == structure.value ? 1 : 0;
+  const auto actor = make_bone_actor(isosurface<std::uint8_t>({labels.frame, only}, 0.5, 0));
+  actor->GetProperty()->SetColor(structure.rgb[0] / 255.0, structure.rgb[1] / 255.0, structure.rgb[2] / 255.0);
+  return actor;
+}
+
 vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
   if (const auto* surface = std::get_if<Surface>(&s.surface)) return to_vtk(**surface);
+  // Structures are drawn inside the bone, not instead of it.
+  const bool mask_is_bone = structures_of(s).empty();
   for (const Data* data : {&s.mask, &s.subject}) {
+    if (data == &s.mask && !mask_is_bone) continue;
     if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
       return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
@@ -185,6 +205,9 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   const bool flat = !std::holds_alternative<Surface>(s.subject);
   const auto [lo, hi] = bounds_of(s.subject);
   const Vec3 centre = (lo + hi) * 0.5, size = hi - lo;
+  const bool through_given = p.centre_mm != std::array<double, 3>{};
+  const Vec3 through = through_given ? Vec3{p.centre_mm[0], p.centre_mm[1], p.centre_mm[2]} : centre;
+  const std::vector<Structure> structures = structures_of(s);
 
   if (flat) {
     const bool labels_only = std::holds_alternative<Labels>(s.subject);
@@ -194,13 +217,14 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
       context.progress(0.1 * n, "slices");
       SliceView view;
       view.plane = static_cast<Plane>(n);
-      view.centre_mm = view.through_mm = centre;
+      view.centre_mm = centre;
+      view.through_mm = through;
       view.width = pw;
       view.height = ph;
       const double w = n == 2 ? size.y : size.x, h = n == 0 ? size.y : size.z;
       view.mm_per_pixel = std::max({w / (pw - 8), h / (ph - 8), 1e-3});
       const int x = n == 1 ? p.width - pw : 0, y = n == 2 ? p.height - ph : 0;
-      paste(picture, draw_slice(view, grey, label), x, y);
+      paste(picture, draw_slice(view, grey, label, structures), x, y);
       write_directions(picture, view, x, y);
     }
   }
@@ -214,7 +238,12 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
     vtkNew<vtkRenderer> renderer;
     window.window()->AddRenderer(renderer);
     set_up_scene(renderer);
-    renderer->AddActor(make_bone_actor(surface));
+    const auto bone = make_bone_actor(surface);
+    renderer->AddActor(bone);
+    if (!structures.empty() && std::holds_alternative<Labels>(s.mask)) {
+      bone->GetProperty()->SetOpacity(0.3);
+      for (const Structure& each : structures) renderer->AddActor(structure_actor(std::get<Labels>(s.mask), each));
+    }
     double b[6];
     surface->GetBounds(b);
     const Vec3 middle{(b[0] + b[1]) / 2, (b[2] + b[3]) / 2, (b[4] + b[5]) / 2};
@@ -234,7 +263,7 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
 
 StageInfo SnapshotStage::info() {
   return {.name = "snapshot",
-          .version = 1,
+          .version = 2,
           .synopsis = "a picture (PNG) of a CT, mask, bone grid or surface",
           .description =
               "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit view in "

@@ -8,7 +8,7 @@ namespace osteo {
 
 struct ResampleParams {
   double spacing_mm = 0.5;
-  double lower = 300;
+  double lower = 0;  ///< 0: the value that tells the mask from the rest best
 };
 
 struct ResampledBone {
@@ -24,6 +24,7 @@ struct ResampledBone {
 /// The boundary's offset is then set (a few HU at most, reported) so that the bone keeps the mask's volume; see docs.
 /// A voxel's density is the share of it inside, from the signed HU distance to the boundary over its gradient; coarser
 /// voxels than the CT's are averaged from sub-voxels, so nothing aliases.
+/// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels (the highest such).
 /// `ct` and `mask` must lie at the same place (Error usage). O(output voxels near bone). Same bytes for any thread count.
 [[nodiscard]] ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& params, const Context& context = {});
 
@@ -31,7 +32,7 @@ struct ResampleStage {
   using Params = ResampleParams;
   static void describe(Params& p, auto& visit) {
     visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
-    visit({"lower", "HU at the boundary of bone: the --lower of threshold", "HU", -32768, 32767}, p.lower);
+    visit({"lower", "HU at the boundary of bone (0: the value that fits the mask best, the --lower of threshold)", "HU", -32768, 32767}, p.lower);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -29,7 +29,9 @@ using GreyAt = std::function<double(Vec3)>;
 /// Label at a point; 0 is clear, others are tinted over the grey.
 using LabelAt = std::function<int(Vec3)>;
 
-[[nodiscard]] Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label = nullptr);
+/// `structures` give labels colours of their own.
+[[nodiscard]] Picture draw_slice(const SliceView& view, const GreyAt& grey, const LabelAt& label = nullptr,
+                                 const std::vector<Structure>& structures = {});
 
 /// Grey for bone work: -200 HU black to 1500 HU white.
 [[nodiscard]] double grey_of_hu(double hu);

@@ -18,12 +18,13 @@ struct SnapshotParams {
   int height = 1000;
   ViewFrom view = ViewFrom::left_front;
   double bone_hu = 300;
+  std::array<double, 3> centre_mm{0, 0, 0};
   std::string title;
 };
 
 struct SnapshotSubjects {
   Data subject;  ///< image, labels, grid or surface
-  Data mask;     ///< labels or grid, tinted over the cuts; optional
+  Data mask;     ///< labels or grid, tinted over the cuts; optional. Labels with structures: in their colours, in 3D inside clear bone
   Data surface;  ///< shown in 3D instead of one made here; optional
 };
 
@@ -40,6 +41,7 @@ struct SnapshotStage {
     visit({"height", "of the picture", "pixels", 200, 8192}, p.height);
     visit({"view", "from where the 3D view looks at the patient"}, p.view);
     visit({"bone_hu", "surface shown in 3D of a CT without mask", "HU", -1000, 30000}, p.bone_hu);
+    visit({"centre_mm", "point that the cuts go through, LPS (0,0,0: the middle)", "mm"}, p.centre_mm);
     visit({"title", "written in the lower right corner"}, p.title);
   }
   static StageInfo info();
