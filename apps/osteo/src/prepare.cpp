@@ -28,8 +28,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   if (fs::exists(folder) && !fs::is_directory(folder))
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is a file, not a folder");
   const bool is_new = !fs::exists(folder);
-  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") && !fs::exists(folder / "import.json") &&
-      !io.common.force) {
+  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") &&
+      !fs::exists(folder / "import.json") && !io.common.force) {
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case",
                 "give another name, or --force to write into it");
   }

@@ -15,6 +15,7 @@
 
 #include "osteo/dicom/verdict.h"
 #include "rewrite.h"
+#include "sound.h"
 
 namespace osteo {
 namespace {
@@ -186,6 +187,7 @@ void judge(DicomHeader& h, bool has_pixels) {
 }
 
 bool parse(const fs::path& file, DicomHeader& h) {
+  if (!dicom::header_is_sound(file)) return false;
   vtkNew<vtkDICOMParser> parser;
   vtkNew<vtkDICOMMetaData> meta;
   parser->SetMetaData(meta);

@@ -1,19 +1,14 @@
 #include "pixels.h"
 
 #include <fcntl.h>
-#include <gdcmTrace.h>
 #include <unistd.h>
-#include <vtkDICOMReader.h>
-#include <vtkDataArray.h>
-#include <vtkErrorCode.h>
-#include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+
+#include "decode.h"
 
 namespace osteo::dicom {
 namespace {
@@ -145,51 +140,6 @@ class Converter {
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
 };
 
-template <class F>
-void with_vtk_scalars(const DicomHeader& h, F&& take) {
-  // The codecs would tell of it on standard error; what matters comes back as an error code or as wrong sizes.
-  static const bool quiet = [] {
-    gdcm::Trace::WarningOff();
-    gdcm::Trace::ErrorOff();
-    gdcm::Trace::DebugOff();
-    return true;
-  }();
-  static_cast<void>(quiet);
-  vtkNew<vtkDICOMReader> reader;
-  reader->SetFileName(h.file.c_str());
-  reader->SetMemoryRowOrderToFileNative();
-  reader->AutoRescaleOff();
-  reader->SortingOff();  // frames in the order of the file
-  reader->Update();
-  if (reader->GetErrorCode() != vtkErrorCode::NoError) {
-    throw PixelError("its pixels cannot be read: " + std::string(vtkErrorCode::GetStringFromErrorCode(reader->GetErrorCode())));
-  }
-  vtkDataArray* const scalars = reader->GetOutput()->GetPointData()->GetScalars();
-  const std::size_t n = h.pixels_per_frame() * h.frames.size();
-  if (scalars == nullptr || static_cast<std::size_t>(scalars->GetNumberOfValues()) != n) {
-    throw PixelError("its pixels cannot be read: it does not hold " + std::to_string(h.frames.size()) +
-                     " grey pictures of the stated size");
-  }
-  const void* const p = scalars->GetVoidPointer(0);
-  switch (scalars->GetDataType()) {
-    case VTK_SHORT:
-      return take(static_cast<const std::int16_t*>(p));
-    case VTK_UNSIGNED_SHORT:
-      return take(static_cast<const std::uint16_t*>(p));
-    case VTK_UNSIGNED_CHAR:
-      return take(static_cast<const std::uint8_t*>(p));
-    case VTK_SIGNED_CHAR:
-    case VTK_CHAR:
-      return take(static_cast<const std::int8_t*>(p));
-    case VTK_INT:
-      return take(static_cast<const std::int32_t*>(p));
-    case VTK_UNSIGNED_INT:
-      return take(static_cast<const std::uint32_t*>(p));
-    default:
-      throw PixelError("its pixels are of an unusual type");
-  }
-}
-
 }  // namespace
 
 void ValueCount::add(const ValueCount& o) {
@@ -210,30 +160,54 @@ void ValueCount::add(const ValueCount& o) {
 
 void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, ValueCount& count) {
   const std::size_t n = h.pixels_per_frame(), columns = static_cast<std::size_t>(h.columns), rows = static_cast<std::size_t>(h.rows);
-  const auto frame_of = [&](const FrameTarget& t) -> const DicomFrame& { return h.frames[static_cast<std::size_t>(t.frame)]; };
-  if (h.compressed || h.bits_allocated != 16) {
-    with_vtk_scalars(h, [&](const auto* p) {
-      for (const FrameTarget& t : targets) {
-        Converter(h, frame_of(t), count).run(p + static_cast<std::size_t>(t.frame) * n, t.out, columns, rows);
+  const auto convert = [&](const FrameTarget& t, const auto* stored) {
+    Converter(h, h.frames[static_cast<std::size_t>(t.frame)], count).run(stored, t.out, columns, rows);
+  };
+  if (h.compressed) {
+    const CompressedFrames frames(h);
+    for (const FrameTarget& t : targets) {
+      std::vector<std::uint16_t> stored = frames.decode(t.frame);
+      remove_overlay(h, stored.data(), n);
+      if (h.is_signed) {
+        convert(t, reinterpret_cast<const std::int16_t*>(stored.data()));
+      } else {
+        convert(t, stored.data());
       }
-    });
+    }
     return;
   }
   for (const FrameTarget& t : targets) {
-    // Read into place and converted there.
-    read_bytes(h, h.pixel_offset + static_cast<std::uint64_t>(t.frame) * h.bytes_per_frame(), t.out, n * 2);
-    if (h.big_endian) {
-      for (std::size_t i = 0; i < n; ++i) {
-        const auto v = static_cast<std::uint16_t>(t.out[i]);
-        t.out[i] = static_cast<std::int16_t>(static_cast<std::uint16_t>(v << 8 | v >> 8));
+    const std::uint64_t offset = h.pixel_offset + static_cast<std::uint64_t>(t.frame) * h.bytes_per_frame();
+    if (h.bits_allocated == 8) {
+      std::vector<std::uint8_t> stored(n);
+      read_bytes(h, offset, stored.data(), n);
+      if (h.is_signed) {
+        convert(t, reinterpret_cast<const std::int8_t*>(stored.data()));
+      } else {
+        convert(t, stored.data());
       }
+      continue;
     }
+    if (h.bits_allocated == 32) {
+      std::vector<std::uint32_t> stored(n);
+      read_bytes(h, offset, stored.data(), n * 4);
+      if (h.big_endian) std::transform(stored.begin(), stored.end(), stored.begin(), [](std::uint32_t v) { return __builtin_bswap32(v); });
+      if (h.is_signed) {
+        convert(t, reinterpret_cast<const std::int32_t*>(stored.data()));
+      } else {
+        convert(t, stored.data());
+      }
+      continue;
+    }
+    // Read into place and converted there.
+    read_bytes(h, offset, t.out, n * 2);
+    auto* const words = reinterpret_cast<std::uint16_t*>(t.out);
+    if (h.big_endian) std::transform(words, words + n, words, [](std::uint16_t v) { return __builtin_bswap16(v); });
     remove_overlay(h, t.out, n);
-    Converter convert(h, frame_of(t), count);
     if (h.is_signed) {
-      convert.run(t.out, t.out, columns, rows);
+      convert(t, t.out);
     } else {
-      convert.run(reinterpret_cast<const std::uint16_t*>(t.out), t.out, columns, rows);
+      convert(t, words);
     }
   }
 }

@@ -23,6 +23,8 @@
 namespace osteo {
 namespace {
 
+constexpr std::string_view kIndex = "1.2.840.10008.1.3.10";  // Media Storage Directory Storage: a DICOMDIR
+
 struct Found {
   fs::path file;
   std::string name;
@@ -194,7 +196,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     for (auto& u : dicom::unpack(source, scan.scratch->path(), context.sub(0, 0.4))) found.push_back({u.file, u.name});
     std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
   } else {
-    found = files_of_index(source, scan.set_aside);
+    if (read_dicom_header(source, scan.scratch->path()).sop_class == kIndex) found = files_of_index(source, scan.set_aside);
     if (found.empty()) found.push_back({source, source.filename().string()});
   }
   scan.files = found.size();

@@ -6,6 +6,7 @@
 
 #include "osteo/base/parallel.h"
 #include "osteo/base/param.h"
+#include "osteo/io/vtk_data.h"
 #include "slices.h"
 #include "value_check.h"
 
@@ -104,6 +105,7 @@ Refused::Refused(const Verdict& verdict, ExitCode exit_code)
     : Error(exit_code, why(verdict), first_error(verdict).advice), verdict_(std::make_shared<const Verdict>(verdict)) {}
 
 DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& options, const Context& context) {
+  const QuietVtk quiet;
   DicomVolume result;
   with_placement(series, options, [&](Placement& p) {
     const int columns = p.verdict.columns, rows = p.verdict.rows;
@@ -177,6 +179,7 @@ const Verdict& DicomSlabs::verdict() const {
 }
 
 void DicomSlabs::run(int layers_each, const Context& context, const std::function<void(int, int, const std::int16_t*)>& take) {
+  const QuietVtk quiet;
   with_placement(impl_->series, impl_->options, [&](Placement& p) {
     const int columns = p.verdict.columns, rows = p.verdict.rows;
     const std::size_t area = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);

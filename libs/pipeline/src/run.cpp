@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -53,6 +54,12 @@ void set_params(Stage& stage, const PipelineNode& node) {
       throw e.in("stage '" + node.id + "'");
     }
   }
+}
+
+// A DICOM UID names a scan of a patient: the key still depends on it, the record says only that there was one.
+std::string without_uid(const std::string& text) {
+  const bool digits = text.find_first_not_of("0123456789.") == std::string::npos;
+  return digits && std::count(text.begin(), text.end(), '.') >= 3 ? "(UID)" : text;
 }
 
 class Runner {
@@ -120,7 +127,7 @@ class Runner {
     result.outputs = node.outputs;
     std::string text = node.stage + "/" + std::to_string(stages_[n]->info().version) + "\n";
     for (const auto& f : stages_[n]->fields()) {
-      result.params[std::string(f.doc.name)] = f.to_text();
+      result.params[std::string(f.doc.name)] = without_uid(f.to_text());
       text += std::string(f.doc.name) + "=" + f.to_text() + "\n";
     }
     for (const auto& [port, input] : node.inputs) {
