@@ -4,7 +4,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
-find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel CommonMath CommonSystem
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonTransforms CommonDataModel CommonExecutionModel CommonMath CommonSystem
   FiltersCore FiltersSources FiltersGeneral IOImage IOXML IOPLY IOGeometry IOCore CommonMisc ImagingCore RenderingCore RenderingOpenGL2
   RenderingFreeType glew metaio)
 find_package(DICOM REQUIRED)

@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "osteo/base/error.h"
+#include "osteo/base/files.h"
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
 #include "osteo/grid/grid_io.h"
@@ -76,6 +77,7 @@ struct WindowCommand {
     window.tool = tool;
     window.width = p.width;
     window.height = p.height;
+    if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));
     int gl_errors = 0;
     try {
       gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions);

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <fstream>
 
 #include "pixels.h"
 
@@ -32,7 +31,7 @@ struct Shape {
 };
 
 // What the codestream itself says: SOF of JPEG and JPEG-LS (ISO 10918-1 B.2.2, 14495-1), SIZ of JPEG 2000 (15444-1 A.5.1).
-Shape shape_of(const std::vector<char>& bytes, bool jpeg2000) {
+Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
   const std::size_t n = bytes.size();
   const char* const p = bytes.data();
   if (jpeg2000) {
@@ -64,7 +63,9 @@ bool starts_picture(const char* p, std::uint64_t length) {
   return length > 3 && (u16(p) == 0xFFD8 || u16(p) == 0xFF4F || std::memcmp(p, "\0\0\0\x0C", 4) == 0);
 }
 
-std::vector<char> decode_with_gdcm(const DicomHeader& h, const std::vector<char>& in) {
+// Hands the decoded bytes to take(pointer, count); false when the codec fails.
+template <class F>
+bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) {
   static const bool quiet = [] {
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
@@ -103,9 +104,9 @@ std::vector<char> decode_with_gdcm(const DicomHeader& h, const std::vector<char>
     fragments->AddFragment(fragment);
     gdcm::DataElement from(gdcm::Tag(0x7FE0, 0x0010)), to;
     from.SetValue(*fragments);
-    if (!codec.Decode(from, to) || to.GetByteValue() == nullptr) return std::vector<char>{};
-    const gdcm::ByteValue& bytes = *to.GetByteValue();
-    return std::vector<char>(bytes.GetPointer(), bytes.GetPointer() + bytes.GetLength());
+    if (!codec.Decode(from, to) || to.GetByteValue() == nullptr) return false;
+    take(to.GetByteValue()->GetPointer(), static_cast<std::size_t>(to.GetByteValue()->GetLength()));
+    return true;
   };
   try {
     if (jpeg2000) {
@@ -119,8 +120,10 @@ std::vector<char> decode_with_gdcm(const DicomHeader& h, const std::vector<char>
     }
     gdcm::JPEGCodec codec;
     return run(codec);
+  } catch (const PixelError&) {
+    throw;
   } catch (const std::exception&) {
-    return {};
+    return false;
   }
 }
 
@@ -148,10 +151,7 @@ CompressedFrames::CompressedFrames(const DicomHeader& h) : header_(h) {
   if (!supported(h.transfer_syntax)) throw PixelError("its pixels are encoded by " + h.transfer_syntax + ", which is not supported");
   if (h.pixel_offset >= h.file_bytes) throw PixelError("its compressed pixels are missing");
   bytes_.resize(static_cast<std::size_t>(h.file_bytes - h.pixel_offset));
-  std::ifstream in(h.file, std::ios::binary);
-  in.seekg(static_cast<std::streamoff>(h.pixel_offset));
-  in.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
-  if (!in) throw PixelError("its compressed pixels cannot be read");
+  read_bytes(h, h.pixel_offset, bytes_.data(), bytes_.size());
   const auto little = [&](std::uint64_t at) {
     std::uint32_t v = 0;
     std::memcpy(&v, bytes_.data() + at, sizeof v);
@@ -198,22 +198,34 @@ CompressedFrames::CompressedFrames(const DicomHeader& h) : header_(h) {
   first_.push_back(items_.size());
 }
 
-std::vector<char> CompressedFrames::bytes_of(int frame) const {
-  std::vector<char> joined;
+std::span<const char> CompressedFrames::bytes_of(int frame, std::vector<char>& joined) const {
   const auto f = static_cast<std::size_t>(frame);
-  for (std::size_t i = first_[f]; i < first_[f + 1]; ++i) {
-    const char* const p = bytes_.data() + items_[i].first;
-    joined.insert(joined.end(), p, p + items_[i].second);
+  const auto piece = [&](std::size_t i) { return std::span(bytes_.data() + items_[i].first, static_cast<std::size_t>(items_[i].second)); };
+  std::span<const char> all = piece(first_[f]);
+  if (first_[f + 1] > first_[f] + 1) {
+    for (std::size_t i = first_[f]; i < first_[f + 1]; ++i) joined.insert(joined.end(), piece(i).begin(), piece(i).end());
+    all = joined;
   }
-  if (joined.size() < 8) throw PixelError("its compressed pixels are cut short");
-  return joined;
+  if (all.size() < 8) throw PixelError("its compressed pixels are cut short");
+  return all;
 }
 
 std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
   const DicomHeader& h = header_;
-  const std::vector<char> in = bytes_of(frame);
+  std::vector<char> joined;
+  const std::span<const char> in = bytes_of(frame, joined);
   const std::size_t n = h.pixels_per_frame();
-  std::vector<char> out;
+  std::vector<std::uint16_t> values(n);
+  const auto take = [&](const char* p, std::size_t count) {
+    if (count >= 2 * n && h.bits_allocated != 8) {
+      std::memcpy(values.data(), p, 2 * n);
+    } else if (count >= n && count < 2 * n) {
+      for (std::size_t i = 0; i < n; ++i) values[i] = static_cast<std::uint8_t>(p[i]);
+    } else {
+      throw PixelError("its compressed pixels are damaged");
+    }
+  };
+  bool good = false;
   if (h.transfer_syntax == kRle) {
     vtkDICOMImageCodec::ImageFormat format;
     format.Rows = static_cast<unsigned short>(h.rows);
@@ -222,23 +234,19 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
     format.BitsStored = static_cast<unsigned short>(h.bits_stored);
     format.PixelRepresentation = h.is_signed ? 1 : 0;
     format.SamplesPerPixel = 1;
-    out.resize(h.bytes_per_frame());
     const vtkDICOMImageCodec codec(vtkDICOMImageCodec::RLE);
-    if (codec.Decode(format, reinterpret_cast<const unsigned char*>(in.data()), in.size(), reinterpret_cast<unsigned char*>(out.data()),
-                     out.size()) != 0) {
-      out.clear();
+    const auto* const from = reinterpret_cast<const unsigned char*>(in.data());
+    if (h.bits_allocated == 16) {
+      good = codec.Decode(format, from, in.size(), reinterpret_cast<unsigned char*>(values.data()), 2 * n) == 0;
+    } else {
+      std::vector<char> out(h.bytes_per_frame());
+      good = codec.Decode(format, from, in.size(), reinterpret_cast<unsigned char*>(out.data()), out.size()) == 0;
+      if (good) take(out.data(), out.size());
     }
   } else {
-    out = decode_with_gdcm(h, in);
+    good = decode_with_gdcm(h, in, take);
   }
-  std::vector<std::uint16_t> values(n);
-  if (out.size() >= 2 * n && h.bits_allocated != 8) {
-    std::memcpy(values.data(), out.data(), 2 * n);
-  } else if (out.size() >= n && out.size() < 2 * n) {
-    for (std::size_t i = 0; i < n; ++i) values[i] = static_cast<std::uint8_t>(out[i]);
-  } else {
-    throw PixelError("its compressed pixels are damaged");
-  }
+  if (!good) throw PixelError("its compressed pixels are damaged");
   // Codecs leave the bits above the sign bit as they please.
   const int sign = h.bits_stored - 1;
   if (h.is_signed && sign > 0 && sign < 15) {

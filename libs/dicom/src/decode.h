@@ -4,6 +4,7 @@
 // whose stated size is that of the header: the codecs' own readers ask for memory by whatever a damaged file says, or abort.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "osteo/dicom/header.h"
@@ -19,7 +20,7 @@ class CompressedFrames {
   [[nodiscard]] std::vector<std::uint16_t> decode(int frame) const;
 
  private:
-  [[nodiscard]] std::vector<char> bytes_of(int frame) const;
+  [[nodiscard]] std::span<const char> bytes_of(int frame, std::vector<char>& joined) const;
 
   const DicomHeader& header_;
   std::vector<char> bytes_;                                     // from the first item on

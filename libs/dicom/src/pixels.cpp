@@ -19,21 +19,6 @@ constexpr double kPaddingBelowHu = -1200;
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
 
-void read_bytes(const DicomHeader& h, std::uint64_t offset, void* out, std::size_t bytes) {
-  const int fd = ::open(h.file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) throw PixelError(std::string("it cannot be read: ") + std::strerror(errno));
-  std::size_t got = 0;
-  while (got < bytes) {
-    const ssize_t n = ::pread(fd, static_cast<char*>(out) + got, bytes - got, static_cast<off_t>(offset + got));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) break;
-    got += static_cast<std::size_t>(n);
-  }
-  ::close(fd);
-  if (got < bytes)
-    throw PixelError("the file is cut short: " + std::to_string(got) + " of " + std::to_string(bytes) + " bytes of pixels are there");
-}
-
 // Keeps the bits of the pixel where others hold an overlay.
 template <class T>
 void remove_overlay(const DicomHeader& h, T* p, std::size_t n) {
@@ -141,6 +126,21 @@ class Converter {
 };
 
 }  // namespace
+
+void read_bytes(const DicomHeader& h, std::uint64_t offset, void* out, std::size_t bytes) {
+  const int fd = ::open(h.file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) throw PixelError(std::string("it cannot be read: ") + std::strerror(errno));
+  std::size_t got = 0;
+  while (got < bytes) {
+    const ssize_t n = ::pread(fd, static_cast<char*>(out) + got, bytes - got, static_cast<off_t>(offset + got));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    got += static_cast<std::size_t>(n);
+  }
+  ::close(fd);
+  if (got < bytes)
+    throw PixelError("the file is cut short: " + std::to_string(got) + " of " + std::to_string(bytes) + " bytes of pixels are there");
+}
 
 void ValueCount::add(const ValueCount& o) {
   hu_min = std::min(hu_min, o.hu_min);

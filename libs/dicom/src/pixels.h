@@ -30,6 +30,9 @@ struct PixelError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Throws PixelError when the file ends early.
+void read_bytes(const DicomHeader& header, std::uint64_t offset, void* out, std::size_t bytes);
+
 struct FrameTarget {
   int frame = 0;
   std::int16_t* out = nullptr;

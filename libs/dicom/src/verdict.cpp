@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "osteo/base/error.h"
+
 namespace osteo {
 namespace {
 
@@ -113,6 +115,30 @@ std::string to_json(const Verdict& v) {
     for (const FileSetAside& f : v.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
   }
   return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+VerdictSummary read_verdict(std::string_view text) {
+  const auto no_verdict = [](const std::string& why) { return Error(ExitCode::corrupt, "this is no verdict of an import: " + why); };
+  const ordered_json j = ordered_json::parse(text, nullptr, false);
+  if (j.is_discarded() || !j.is_object()) throw no_verdict("not JSON");
+  try {
+    if (j.at("osteotome_verdict").get<int>() != 1) throw no_verdict("of an unknown version");
+    VerdictSummary summary;
+    summary.status = j.at("status").get<std::string>();
+    for (const auto& f : j.at("findings")) {
+      Finding finding;
+      finding.code = f.at("code").get<std::string>();
+      const auto severity = f.at("severity").get<std::string>();
+      finding.severity = severity == "error" ? Severity::error : severity == "warning" ? Severity::warning : Severity::info;
+      finding.message = f.at("message").get<std::string>();
+      finding.advice = f.value("advice", "");
+      if (f.contains("files")) finding.files = f.at("files").get<std::vector<std::string>>();
+      summary.findings.push_back(std::move(finding));
+    }
+    return summary;
+  } catch (const nlohmann::json::exception& e) {
+    throw no_verdict(e.what());
+  }
 }
 
 }  // namespace osteo

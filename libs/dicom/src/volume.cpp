@@ -89,6 +89,17 @@ Frame lattice_of(const Placement& p, int columns, int rows, Vec3 h) {
   return f;
 }
 
+// Where an upright, even series only has holes, the slices that are there stay as they are.
+double layer_distance(const Placement& p) {
+  const double pitch = p.verdict.gap_min_mm;
+  const bool only_holes = std::all_of(p.slices.begin(), p.slices.end(), [&](const PlacedSlice& s) {
+    return std::abs(s.along_mm - std::round(s.along_mm / pitch) * pitch) <= kSamePlaceMm &&
+           std::hypot(s.sideways_mm[0], s.sideways_mm[1]) <= kSamePlaceMm;
+  });
+  if (only_holes) return p.slices.back().along_mm / std::round(p.slices.back().along_mm / pitch);
+  return std::max(std::min(pitch, 0.5), std::min(p.column_spacing_mm, p.row_spacing_mm));
+}
+
 void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count) {
   Verdict& v = p.verdict;
   v.output = frame;
@@ -131,7 +142,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
       }
       result.image = {frame, pixels};
     } else {
-      const double dz = std::max(std::min(p.verdict.gap_min_mm, 1.0), std::min(p.column_spacing_mm, p.row_spacing_mm));
+      const double dz = layer_distance(p);
       const Frame frame = lattice_of(p, columns, rows, {p.column_spacing_mm, p.row_spacing_mm, dz});
       finish(p, frame, reader.count());
       const SliceSampler sampler(p, columns, rows, frame);

@@ -50,6 +50,25 @@ void write_manifest(const fs::path& folder, const std::string& pipeline_name, co
   write_file(folder / "manifest.json", m.dump(2) + "\n");
 }
 
+std::map<std::string, ManifestFile> parse_manifest(std::string_view json) {
+  std::map<std::string, ManifestFile> files;
+  try {
+    const ordered_json m = ordered_json::parse(json);
+    if (m.at("osteotome_case") != 1) throw Error(ExitCode::corrupt, "it is of an unknown version");
+    for (const auto& [role, f] : m.at("files").items()) {
+      ManifestFile file{f.at("file").get<std::string>(), f.at("hash").get<std::string>()};
+      if (file.name.empty() || file.name.find('/') != std::string::npos || file.name == "..") {
+        throw Error(ExitCode::corrupt, "it names a file outside the case");
+      }
+      files[role] = std::move(file);
+    }
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ExitCode::corrupt, std::string("it is damaged: ") + e.what(), "run 'osteo prepare' again");
+  }
+  if (!files.contains("bone")) throw Error(ExitCode::corrupt, "it names no bone");
+  return files;
+}
+
 Case load_case(const fs::path& folder) {
   require_readable(folder);
   const fs::path manifest = folder / "manifest.json";
@@ -59,25 +78,21 @@ Case load_case(const fs::path& folder) {
   }
   Case result;
   result.folder = folder;
-  ordered_json m;
+  std::map<std::string, ManifestFile> files;
   try {
-    m = ordered_json::parse(read_text(manifest));
-    if (m.at("osteotome_case") != 1) throw Error(ExitCode::corrupt, "'" + manifest.string() + "' is of an unknown version");
-    for (const auto& [role, f] : m.at("files").items()) {
-      const std::string name = f.at("file");
-      if (name.find('/') != std::string::npos) throw Error(ExitCode::corrupt, "'" + manifest.string() + "' names a file outside the case");
-      const fs::path path = folder / name;
-      require_readable(path);
-      if (hash_path(path) != f.at("hash").get<std::string>()) {
-        throw Error(ExitCode::corrupt, "'" + path.string() + "' is not the file that the manifest describes",
-                    "it was changed or damaged: run 'osteo prepare' again");
-      }
-      result.files[role] = path;
-    }
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, "'" + manifest.string() + "' is damaged: " + e.what(), "run 'osteo prepare' again");
+    files = parse_manifest(read_text(manifest));
+  } catch (const Error& e) {
+    throw e.in("'" + manifest.string() + "'");
   }
-  if (!result.files.contains("bone")) throw Error(ExitCode::corrupt, "'" + manifest.string() + "' names no bone");
+  for (const auto& [role, f] : files) {
+    const fs::path path = folder / f.name;
+    require_readable(path);
+    if (hash_path(path) != f.hash) {
+      throw Error(ExitCode::corrupt, "'" + path.string() + "' is not the file that the manifest describes",
+                  "it was changed or damaged: run 'osteo prepare' again");
+    }
+    result.files[role] = path;
+  }
   result.bone = load_grid(result.files["bone"]);
   return result;
 }

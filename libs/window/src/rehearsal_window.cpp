@@ -43,7 +43,7 @@ constexpr double kDisplayForceN = 4;  // full length of the force bar
 class RehearsalWindow {
  public:
   RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
-      : actions_(actions), tool_(options.tool) {
+      : actions_(actions), scan_(options.scan), tool_(options.tool) {
     if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
     make_scene();
@@ -416,6 +416,22 @@ class RehearsalWindow {
     message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
   }
 
+  // The words of the import's verdict.
+  void scan_notes() {
+    if (scan_.status.empty()) return;
+    const bool open = ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan_.status.c_str(), static_cast<int>(scan_.findings.size()));
+    if (!open) return;
+    for (const Finding& f : scan_.findings) {
+      const ImVec4 colour = f.severity == Severity::info ? ImVec4(0.75F, 0.8F, 0.85F, 1) : ImVec4(1.0F, 0.8F, 0.35F, 1);
+      ImGui::PushStyleColor(ImGuiCol_Text, colour);
+      ImGui::TextWrapped("%s [%s]", f.message.c_str(), f.code.c_str());
+      ImGui::PopStyleColor();
+      if (!f.advice.empty()) ImGui::TextWrapped("%s", f.advice.c_str());
+    }
+    ImGui::TreePop();
+    ImGui::Separator();
+  }
+
   void panel() {
     Rehearsal& rehearsal = actions_.rehearsal();
     const TickRecord tick = rehearsal.latest();
@@ -465,6 +481,7 @@ class RehearsalWindow {
     ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(bone_view_->triangles()) / 1e6,
                 static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
+    scan_notes();
     ImGui::TextWrapped("F1: mouse and keys");
     if (std::chrono::steady_clock::now() < message_until_) {
       ImGui::Separator();
@@ -499,6 +516,7 @@ class RehearsalWindow {
   }
 
   WindowActions actions_;
+  VerdictSummary scan_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;

@@ -5,9 +5,12 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/dicom/save_series.h"
+#include "osteo/dicom/volume.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/grid/resample.h"
+#include "osteo/grid/sampler.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
 
@@ -161,6 +164,106 @@ TEST(BrickGrid, FindCoordinateAndBlocksAgree) {
   for (int k = 5; k < 17; ++k)
     for (int j = -2; j < 9; ++j)
       for (int i = -3; i < 10; ++i) EXPECT_EQ(block[at++], g.at(i, j, k));
+}
+
+// What a case keeps of a patient is bone: no voxel is stored that does not touch bone, so no skin, and no face.
+TEST(Resample, NothingButBoneIsKept) {
+  PhantomParams p;
+  p.spacing_mm = 2;
+  const Phantom phantom = make_phantom(p);
+  ThresholdParams t;
+  t.lower = 500;
+  const Labels mask = threshold(phantom.ct, t);
+  const ResampledBone bone = resample_bone(phantom.ct, mask, {});
+  EXPECT_EQ(bone.hu.active_voxels, bone.density.active_voxels);
+  // Skin: soft tissue with air beside it. The phantom's head has a whole coat of it.
+  const Frame& f = phantom.ct.frame;
+  const GridSampler hu(bone.hu);
+  std::size_t skin = 0, kept = 0, near = 0;
+  for (int k = 1; k + 1 < f.dims[2]; ++k)
+    for (int j = 1; j + 1 < f.dims[1]; ++j)
+      for (int i = 1; i + 1 < f.dims[0]; ++i) {
+        bool air = false, is_bone = false;
+        for (int n = 0; n < 27; ++n) {
+          const int x = i + n % 3 - 1, y = j + n / 3 % 3 - 1, z = k + n / 9 - 1;
+          air = air || phantom.ct.at(x, y, z) < -500;
+          is_bone = is_bone || mask.at(x, y, z) != 0;
+        }
+        if (!air || phantom.ct.at(i, j, k) < -300) continue;
+        ++skin;
+        const bool stored = hu.nearest(f.world_from_index({double(i), double(j), double(k)})) > -1024;
+        kept += stored && !is_bone;
+        near += is_bone;
+      }
+  EXPECT_GT(skin, 5000u);
+  EXPECT_EQ(kept, 0u);
+  EXPECT_LT(near, skin / 2);
+}
+
+TEST(Resample, FindsTheThresholdOfTheMask) {
+  const Image ct = ball(1, 20.3);
+  for (const double lower : {350.0, 500.0, 720.0}) {
+    ThresholdParams t;
+    t.lower = lower;
+    Context c;
+    const ResampledBone given = resample_bone(ct, threshold(ct, t), {.spacing_mm = 0.5, .lower = lower});
+    const ResampledBone found = resample_bone(ct, threshold(ct, t), {.spacing_mm = 0.5}, c);
+    double lower_hu = 0;
+    for (const auto& [key, value] : c.take_report()) {
+      if (key == "lower_hu") lower_hu = std::get<double>(value);
+    }
+    EXPECT_NEAR(lower_hu, lower, 12);  // the ball's values are not dense
+    EXPECT_NEAR(found.volume_after_mm3, given.volume_after_mm3, 0.002 * given.volume_after_mm3);
+  }
+}
+
+// Straight to sparse: the same ball through DICOM, tilted by 20 degrees and unevenly spaced.
+TEST(ImportBone, TiltedUnevenBallKeepsItsShape) {
+  const TemporaryFolder folder;
+  // Slices of the ball where a tilted scanner would have put them.
+  const double radius = 20.3, shear = std::tan(20 * M_PI / 180);
+  std::vector<double> z;
+  for (double at = -26; at < 26; at += z.size() % 2 == 0 ? 0.8 : 1.3) z.push_back(at);
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    Frame f;
+    f.dims = {64, 64, 1};
+    f.spacing_mm = {1, 1, 1};
+    f.origin_mm = {-31.6, -31.3 + shear * z[k], z[k]};
+    const auto v = make_voxels<std::int16_t>(f.voxel_count());
+    for (int j = 0; j < 64; ++j)
+      for (int i = 0; i < 64; ++i) {
+        const double d = radius - length(f.world_from_index({double(i), double(j), 0}));
+        v[static_cast<std::size_t>(j) * 64 + static_cast<std::size_t>(i)] =
+            static_cast<std::int16_t>(std::lround(500 + 500 * std::tanh(d / 1.5)));
+      }
+    save_dicom_series({f, v}, folder.path() / ("s" + std::to_string(k)));
+  }
+  // Each folder is a series of its own: one UID for all.
+  DicomScan scan = scan_dicom(folder.path());
+  DicomSeries series = scan.series.front();
+  series.headers.clear();
+  for (auto& s : scan.series) series.headers.insert(series.headers.end(), s.headers.begin(), s.headers.end());
+  ASSERT_EQ(series.headers.size(), z.size());
+  DicomSlabs slabs(series, {}, 0.5);
+  EXPECT_NEAR(slabs.verdict().tilt_deg, 20, 0.01);
+  double volume = 0, off = 0;
+  std::size_t edge = 0;
+  slabs.run(8, {}, [&](int first, int layers, const std::int16_t* hu) {
+    const Frame& f = slabs.frame();
+    for (int k = 0; k < layers; ++k)
+      for (int j = 0; j < f.dims[1]; ++j)
+        for (int i = 0; i < f.dims[0]; ++i, ++hu) {
+          if (*hu == DicomSlabs::kNoValue) continue;
+          volume += *hu >= 500 ? f.voxel_volume_mm3() : 0;
+          if (*hu < 300 || *hu > 700) continue;
+          // Near the edge the value tells how deep the point lies.
+          const double depth = 1.5 * std::atanh((*hu - 500) / 500.0);
+          off += std::abs(depth - (radius - length(f.world_from_index({double(i), double(j), double(first + k)}))));
+          ++edge;
+        }
+  });
+  EXPECT_NEAR(volume / (4.0 / 3 * M_PI * radius * radius * radius), 1, 0.01);
+  EXPECT_LT(off / static_cast<double>(edge), 0.06);
 }
 
 }  // namespace

@@ -9,10 +9,10 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataNormals.h>
 
+#include "osteo/dicom/import.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
-#include "osteo/dicom/import.h"
 #include "osteo/io/vtk_data.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/vtk/vtkOsteoDataObject.h"

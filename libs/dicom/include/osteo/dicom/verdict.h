@@ -106,4 +106,12 @@ struct Verdict {
 /// Pretty-printed, keys in a fixed order. Says nothing that identifies the patient.
 [[nodiscard]] std::string to_json(const Verdict& verdict);
 
+/// What a person wants to know of a verdict that was written before.
+struct VerdictSummary {
+  std::string status;  ///< "good", "repaired", "refused"
+  std::vector<Finding> findings;
+};
+/// Error(corrupt) when the text is no verdict.
+[[nodiscard]] VerdictSummary read_verdict(std::string_view json);
+
 }  // namespace osteo

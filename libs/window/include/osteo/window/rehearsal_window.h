@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "osteo/dicom/verdict.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/scene/rehearsal.h"
 
@@ -14,6 +15,7 @@ struct WindowOptions {
   int width = 1360, height = 860;
   std::string title;
   int tool = 3;
+  VerdictSummary scan;  ///< what the import found in the scan; status empty: unknown
 };
 
 /// What the window asks of whoever runs the rehearsal.

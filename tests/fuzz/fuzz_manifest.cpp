@@ -1,0 +1,14 @@
+// The manifest of a case, as JSON that anybody may have edited.
+#include <cstdint>
+#include <string_view>
+
+#include "osteo/base/error.h"
+#include "osteo/scene/case.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    static_cast<void>(osteo::parse_manifest({reinterpret_cast<const char*>(data), size}));
+  } catch (const osteo::Error&) {
+  }
+  return 0;
+}
