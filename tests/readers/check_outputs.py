@@ -3,10 +3,10 @@
 
 usage: check_outputs.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when a reader is missing
 """
-import io, pathlib, shutil, subprocess, sys
+import io, json, pathlib, shutil, subprocess, sys
 
 try:
-    import highdicom, nibabel, numpy as np, pydicom, SimpleITK as sitk, trimesh
+    import highdicom, jsonschema, nibabel, numpy as np, pydicom, SimpleITK as sitk, trimesh
 except ImportError as e:
     print(f"skipped: {e}; ./test installs the readers when PyPI can be reached")
     sys.exit(77)
@@ -171,4 +171,16 @@ reader.SetFileNames(reader.GetGDCMSeriesFileNames(str(fixtures / "dicom")))
 series = reader.Execute()
 same("DICOM series in SimpleITK, origin", series.GetOrigin(), ct_affine[:3, 3], 1e-3)
 same("DICOM series in SimpleITK, values", sitk.GetArrayFromImage(series).transpose(2, 1, 0), ct, 0)
+# Verdicts have the shape that docs/verdict.schema.json promises.
+schema = json.loads((pathlib.Path(__file__).parents[2] / "docs/verdict.schema.json").read_text())
+broken = work / "broken"
+shutil.copytree(tilted, broken)
+for name in ("0010.dcm", "0011.dcm", "0012.dcm"):
+    (broken / name).unlink()
+subprocess.run([bin_dir / "osteo", "import", "broken", "broken.nrrd", "--quiet"], cwd=work, capture_output=True)
+osteo("import", fixtures / "ct.nrrd", "again.nrrd")
+for name, status in (("tilted", "repaired"), ("broken", "refused"), ("again", "good")):
+    verdict = json.loads((work / (name + ".nrrd.verdict.json")).read_text())
+    jsonschema.validate(verdict, schema)
+    assert verdict["status"] == status, verdict["findings"]
 print("all read back")

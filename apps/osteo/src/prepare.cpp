@@ -1,4 +1,5 @@
 // prepare: a CT becomes a case.
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
@@ -33,24 +34,31 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case",
                 "give another name, or --force to write into it");
   }
-  std::map<std::string, std::string> settings{{"source", io.arguments[0]},
-                                              {"case", folder.string()},
-                                              {"preset", std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(p.preset)])},
-                                              {"lower", format_number(p.lower)},
-                                              {"region", std::string(EnumNames<Region>::values[static_cast<std::size_t>(p.region)])},
-                                              {"remove_table", p.remove_table ? "true" : "false"},
-                                              {"spacing_mm", format_number(p.spacing_mm)},
-                                              {"series", p.series},
-                                              {"axes", p.axes}};
-  for (const auto& [key, value] : io.settings) settings[key] = value;
   const std::string text = p.pipeline.empty() ? std::string(kTemporalBonePipeline) : read_text(p.pipeline);
+  std::map<std::string, std::string> settings{{"source", io.arguments[0]}, {"case", folder.string()}};
+  // Each flag is a variable of the pipeline; one that another pipeline does not have may only be left alone.
+  Params defaults, given = p;
+  const auto known = pipeline_variables(text);
+  const auto plain = fields_of<PrepareCommand>(defaults), set = fields_of<PrepareCommand>(given);
+  for (std::size_t f = 0; f < set.size(); ++f) {
+    const std::string name(set[f].doc.name), value = set[f].to_text();
+    if (name == "out" || name == "pipeline" || name == "structures" || name == "names") continue;
+    if (std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name; })) {
+      settings[name] = value;
+    } else if (value != plain[f].to_text()) {
+      throw Error(ExitCode::usage,
+                  "the pipeline '" + p.pipeline + "' has no variable '" + name + "', so " + set[f].flag() + " does nothing");
+    }
+  }
+  for (const auto& [key, value] : io.settings) settings[key] = value;
   Pipeline pipeline = parse_pipeline(text, settings);
   const std::string name = pipeline.name;
   if (!p.structures.empty()) {
     PipelineNode node;
     node.id = node.stage = "structures";
     node.inputs["labels"].file = p.structures;
-    node.inputs["image"].node = "ct";
+    const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
+    if (has_ct) node.inputs["image"].node = "ct";
     node.params["names"] = p.names;
     node.outputs["structures"] = folder / "structures.seg.nrrd";
     pipeline.nodes.push_back(std::move(node));

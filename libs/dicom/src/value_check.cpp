@@ -100,17 +100,18 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
   const bool soft_right = c.has_soft_tissue && soft.hu > -150 && soft.hu < 150;
   // Outside the scan the scanner may have cut everything off at -1024.
   const bool cut_air = c.padding_share > 0.01 || count.hu_min <= kAirHu;
-  c.plausible = soft_right && (air_right || (!c.has_air && count.hu_min < -200));
+  const Peak plus_air = peak_between(smooth, raw, total, 850, 1100);
+  const bool turned = plus_air.share > 0.2 && std::abs(plus_air.hu - 1000) < 60 && plus_air.share > 2 * air.share;
+  // No air at all but much "padding" far below it: air on a larger scale.
+  const bool no_air_left = !c.has_air && static_cast<double>(count.found) > 0.2 * pixels;
+  c.plausible = soft_right && !turned && !no_air_left && (air_right || (!c.has_air && count.hu_min < -200));
   const std::string range = std::to_string(count.hu_min) + " to " + std::to_string(count.hu_max);
   if (c.plausible) {
     if (!c.has_air && !cut_air) v.add(code::no_air, Severity::info, "there is no air in the pictures by which to check the HU scale");
     return;
   }
   const std::string advice = "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
-  const Peak plus_air = peak_between(smooth, raw, total, 850, 1100);
-  double below = 0;
-  for (int i = 0; i < bin_of(-900); ++i) below += raw[static_cast<std::size_t>(i)];
-  if (plus_air.share > 0.2 && std::abs(plus_air.hu - 1000) < 60 && !c.has_air && count.hu_min < -150 && below < 0.01 * total) {
+  if (turned) {
     v.add(code::hu_wrong_sign, Severity::error,
           "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
           "the file states the wrong scale; ask for the original export");

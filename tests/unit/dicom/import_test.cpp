@@ -87,5 +87,108 @@ TEST(RealDicom, StraightPhantomSeriesIsTakenVoxelForVoxel) {
   for (const auto& s : scan.series) EXPECT_FALSE(s.usable && s.what == "localizer");
 }
 
+// The codecs run in several threads at once: the same voxels as one thread gives, time after time.
+TEST(Dicom, DecodingInParallelGivesTheSameVoxels) {
+  const auto folder = data("dicom_transfer_syntaxes");
+  if (!fs::exists(folder)) GTEST_SKIP() << "no " << folder;
+  for (const char* kind : {"JPEG2000LosslessOnly", "JPEGLSLossless", "JPEGProcess14SV1", "JPEGProcess2_4", "RLELossless"}) {
+    SCOPED_TRACE(kind);
+    fs::path file;
+    for (const auto& f : test::files_in(folder)) {
+      if (f.filename().string().find(kind) != std::string::npos) file = f;
+    }
+    ASSERT_FALSE(file.empty());
+    Series s("parallel", {file});
+    for (int i = 1; i < 16; ++i) {
+      s.edit(
+          file.filename().string(),
+          [&](DcmDataset& d) {
+            const Vec3 p = test::position_of(d);
+            put(d, DCM_ImagePositionPatient, test::text({p.x, p.y, p.z + i}));
+            put(d, DCM_SOPInstanceUID, "1.2.3." + std::to_string(i));
+          },
+          "copy-" + std::to_string(i));
+    }
+    Context one;
+    one.threads = 1;
+    const Image reference = import_ct(s.folder, {}, one).image;
+    for (int n = 0; n < 4; ++n) {
+      const Image again = import_ct(s.folder, {}).image;
+      ASSERT_TRUE(std::equal(reference.span().begin(), reference.span().end(), again.span().begin()));
+    }
+  }
+}
+
+TEST(Dicom, ADicomdirLeadsToItsFiles) {
+  const auto folder = scratch("index");
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 4;
+  save_dicom_series(make_phantom(p).ct, folder / "SLICES");
+  DcmFileFormat index;
+  DcmDataset& d = *index.getDataset();
+  put(d, DCM_FileSetID, "TEST");
+  const auto files = test::files_in(folder / "SLICES");
+  for (const auto& f : files) {
+    DcmItem* record = nullptr;
+    ASSERT_TRUE(d.findOrCreateSequenceItem(DCM_DirectoryRecordSequence, record, -2).good());
+    put(*record, DCM_DirectoryRecordType, "IMAGE");
+    put(*record, DCM_ReferencedFileID, "SLICES\\" + f.filename().string());
+  }
+  index.getMetaInfo()->putAndInsertString(DCM_MediaStorageSOPClassUID, UID_MediaStorageDirectoryStorage);
+  put(d, DCM_SOPClassUID, UID_MediaStorageDirectoryStorage);
+  put(d, DCM_SOPInstanceUID, "1.2.3.4");
+  ASSERT_TRUE(index.saveFile((folder / "DICOMDIR").c_str(), EXS_LittleEndianExplicit).good());
+  write_file(folder / "SLICES" / "stray.txt", "not in the index");
+  const Imported whole = import_ct(folder / "DICOMDIR", {});
+  EXPECT_EQ(whole.verdict.slices.size(), files.size());
+  EXPECT_TRUE(whole.verdict.set_aside.empty());
+  // A file that the index names but that is not there is told.
+  fs::remove(files.back());
+  const Imported less = import_ct(folder / "DICOMDIR", {});
+  ASSERT_EQ(less.verdict.set_aside.size(), 1u);
+  EXPECT_EQ(less.verdict.set_aside[0].code, code::missing_file);
+}
+
+TEST(Verdict, ComesBackFromItsJson) {
+  Verdict v;
+  v.add(code::tilted, Severity::info, "leans", "", {});
+  v.add(code::slices_missing, Severity::warning, "a hole", "copy again", {"a", "b"});
+  const VerdictSummary back = read_verdict(to_json(v));
+  EXPECT_EQ(back.status, "repaired");
+  ASSERT_EQ(back.findings.size(), 2u);
+  EXPECT_EQ(back.findings[1].code, code::slices_missing);
+  EXPECT_EQ(back.findings[1].severity, Severity::warning);
+  EXPECT_EQ(back.findings[1].files, (std::vector<std::string>{"a", "b"}));
+  for (const char* bad :
+       {"", "{", "[]", "{}", "{\"osteotome_verdict\":2}", "{\"osteotome_verdict\":1,\"status\":\"good\",\"findings\":[1]}"}) {
+    EXPECT_THROW(static_cast<void>(read_verdict(bad)), Error) << bad;
+  }
+}
+
+TEST(Values, WrongScalesAreCaught) {
+  PhantomParams p;
+  p.region = PhantomRegion::head;
+  p.spacing_mm = 3;
+  const Image ct = make_phantom(p).ct;
+  const auto judged = [&](auto change, ImportParams params = {}) -> Verdict {
+    const auto v = make_voxels<std::int16_t>(ct.frame.voxel_count());
+    for (std::size_t i = 0; i < ct.frame.voxel_count(); ++i)
+      v[i] = static_cast<std::int16_t>(std::clamp<double>(change(double(ct.voxels[i])), -32768, 32767));
+    const auto file = scratch("values") / "ct.nrrd";
+    save_image({ct.frame, v}, file);
+    try {
+      return import_ct(file, params).verdict;
+    } catch (const Refused& e) {
+      return e.verdict();
+    }
+  };
+  EXPECT_TRUE(judged([](double v) { return v; }).values.plausible);
+  EXPECT_TRUE(judged([](double v) { return -v; }).has(code::hu_wrong_sign));
+  EXPECT_TRUE(judged([](double v) { return v + 1024; }).has(code::hu_shifted));
+  EXPECT_FALSE(judged([](double v) { return v * 0.5 + 200; }).values.plausible);
+  EXPECT_FALSE(judged([](double v) { return v * 3; }).values.plausible);
+}
+
 }  // namespace
 }  // namespace osteo
