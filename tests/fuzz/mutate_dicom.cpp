@@ -130,8 +130,10 @@ int main(int argc, char** argv) {
     std::fflush(nullptr);
     const pid_t child = ::fork();
     if (child == 0) {
+#ifndef __SANITIZE_ADDRESS__  // whose shadow takes all addresses
       rlimit memory{kMemory, kMemory};
       ::setrlimit(RLIMIT_AS, &memory);
+#endif
       ::freopen("/dev/null", "w", stderr);
       for (int n = done; n < std::min(count, done + 500); ++n) {
         std::mt19937_64 random(seed * 1000003 + static_cast<std::uint64_t>(n));
