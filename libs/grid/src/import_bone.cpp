@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
@@ -49,17 +48,7 @@ class BoneBuilder {
   // Small pieces go; returns the number of pieces found and kept.
   std::pair<std::int64_t, std::int64_t> drop_small_pieces() {
     const Components parts = connected_components(std::move(runs_), frame_.dims, Connectivity::full);
-    std::vector<std::uint32_t> order(parts.voxels.size());
-    std::iota(order.begin(), order.end(), 0U);
-    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return parts.voxels[a] > parts.voxels[b]; });
-    std::vector<bool> drop(order.size(), true);
-    std::int64_t kept = 0;
-    for (std::size_t rank = 0; rank < order.size(); ++rank) {
-      const bool large = static_cast<double>(parts.voxels[order[rank]]) * frame_.voxel_volume_mm3() >= p_.min_volume_mm3;
-      const bool counted = p_.keep_largest == 0 || rank < static_cast<std::size_t>(p_.keep_largest);
-      drop[order[rank]] = !(large && counted);
-      kept += large && counted ? 1 : 0;
-    }
+    const auto drop = components_to_drop(parts, p_.min_volume_mm3 / frame_.voxel_volume_mm3(), p_.keep_largest);
     auto density = density_grid->getAccessor();
     auto hu = hu_grid->getAccessor();
     for (std::size_t r = 0; r < parts.runs.size(); ++r) {
@@ -72,7 +61,7 @@ class BoneBuilder {
       }
     }
     density_grid->tree().prune();
-    return {static_cast<std::int64_t>(order.size()), kept};
+    return {static_cast<std::int64_t>(drop.size()), static_cast<std::int64_t>(std::count(drop.begin(), drop.end(), false))};
   }
 
   openvdb::FloatGrid::Ptr density_grid, hu_grid, valid_grid;

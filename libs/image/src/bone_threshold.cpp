@@ -21,7 +21,7 @@ Histogram& add(Histogram& a, const Histogram& b) {
 // Over all voxels that satisfy `wanted(index, i, j, k)`, in slices.
 template <class F>
 Histogram histogram_of(const Image& ct, int threads, F&& wanted) {
-  const auto [nx, ny, nz] = ct.frame.dims;
+  const int nx = ct.frame.dims[0], ny = ct.frame.dims[1], nz = ct.frame.dims[2];
   std::vector<Histogram> parts(static_cast<std::size_t>(nz));
   parallel_for(static_cast<std::size_t>(nz), 1, threads, [&](std::size_t k, std::size_t) {
     Histogram h(kHigh - kLow);
@@ -85,9 +85,9 @@ BoneGuide guide_threshold(const Image& ct, int threads) {
 
   // Dense bone: voxels all of whose face neighbours are bone as well, so that no edge takes part.
   const double provisional = std::max(g.soft_tissue_hu + 150, g.soft_tissue_hu + 4 * g.noise_hu);
-  const auto [nx, ny, nz] = ct.frame.dims;
+  const int nx = ct.frame.dims[0], ny = ct.frame.dims[1], nz = ct.frame.dims[2];
   const std::size_t sy = static_cast<std::size_t>(nx), sz = sy * static_cast<std::size_t>(ny);
-  const Histogram inside = histogram_of(ct, threads, [&, nx = nx, ny = ny, nz = nz](std::size_t at, int i, int j, int k) {
+  const Histogram inside = histogram_of(ct, threads, [&](std::size_t at, int i, int j, int k) {
     if (ct.voxels[at] < provisional || i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1) return false;
     const auto* const p = ct.voxels.get() + at;
     return p[-1] >= provisional && p[1] >= provisional && p[-static_cast<std::ptrdiff_t>(sy)] >= provisional && p[sy] >= provisional &&

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "clean.h"
 #include "osteo/base/error.h"
@@ -62,17 +61,8 @@ void fill_cavities(std::uint8_t* mask, const Frame& frame, double max_mm3) {
 
 void drop_small_pieces(std::uint8_t* mask, const Frame& frame, const ThresholdParams& p, const Context& context) {
   const auto parts = connected_components({mask, frame.voxel_count()}, frame.dims, 1, p.connectivity);
-  std::vector<std::uint32_t> order(parts.voxels.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return parts.voxels[a] > parts.voxels[b]; });
-  std::vector<bool> drop(order.size(), true);
-  std::int64_t kept = 0;
-  for (std::size_t rank = 0; rank < order.size(); ++rank) {
-    const bool large = static_cast<double>(parts.voxels[order[rank]]) * frame.voxel_volume_mm3() >= p.min_volume_mm3;
-    const bool counted = p.keep_largest == 0 || rank < static_cast<std::size_t>(p.keep_largest);
-    drop[order[rank]] = !(large && counted);
-    kept += large && counted ? 1 : 0;
-  }
+  const auto drop = components_to_drop(parts, p.min_volume_mm3 / frame.voxel_volume_mm3(), p.keep_largest);
+  const auto kept = static_cast<std::int64_t>(std::count(drop.begin(), drop.end(), false));
   paint(mask, parts, frame.dims[0], 0, drop);
   context.report("pieces_found", static_cast<std::int64_t>(parts.voxels.size()));
   context.report("pieces_kept", kept);

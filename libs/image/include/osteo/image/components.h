@@ -34,4 +34,7 @@ struct Components {
 /// The same for runs that are at hand, in scan order.
 [[nodiscard]] Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, Connectivity connectivity);
 
+/// Which components to drop: those below `min_voxels`, and those beyond the `keep_largest` largest (0 keeps all). One a component.
+[[nodiscard]] std::vector<bool> components_to_drop(const Components& components, double min_voxels, int keep_largest);
+
 }  // namespace osteo
