@@ -1,6 +1,7 @@
 // DICOM headers and pixels: our check of lengths, our splitting of fragments, and what the libraries make of the rest.
 #include "file_target.h"
-#include "osteo/dicom/import.h"
+#include "osteo/base/files.h"
+#include "osteo/dicom/header.h"
 #include "pixels.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

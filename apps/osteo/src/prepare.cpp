@@ -13,13 +13,14 @@
 namespace osteo {
 
 cli::CommandInfo PrepareCommand::info() {
-  return {"prepare",
-          "a CT becomes a case that can be rehearsed",
-          "Runs the pipeline temporal-bone.json: import, threshold, resample, surface, preview; writes a manifest. Run again, it keeps "
-          "what is unchanged. "
-          "Variables of the pipeline are also set with --set NAME=VALUE.",
-          {{"source", "DICOM folder, or a volume file (.nrrd .nii.gz .mha .vti)"}},
-          "osteo prepare DICOM_FOLDER -o CASE"};
+  return {
+      "prepare",
+      "a CT becomes a case that can be rehearsed",
+      "Runs the pipeline temporal-bone.json: import, crop, threshold, resample, surface, preview; writes a manifest. Run again, it keeps "
+      "what is unchanged. "
+      "Variables of the pipeline are also set with --set NAME=VALUE.",
+      {{"source", "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti)"}},
+      "osteo prepare DICOM_FOLDER -o CASE"};
 }
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {

@@ -15,7 +15,8 @@ cli::Program make_osteo_program() {
   cli::Program p;
   p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
   p.licence =
-      "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, OpenVDB, oneTBB and zlib (all permissive or MPL-2.0);\n"
+      "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB and zlib (all "
+      "permissive or MPL-2.0);\n"
       "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
       "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
   p.registry.add<ImportStage>();

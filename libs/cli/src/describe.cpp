@@ -95,6 +95,7 @@ std::string usage_line(const CommandInfo& info) {
 std::string port_text(const Port& port, bool output) {
   std::string text = port.help + " (" + kinds_text(port.kinds);
   if (output) text += ": " + suffixes_of(port.kinds.front());
+  if (!port.beside.empty()) text += "; left out, the first output's name with " + port.beside;
   return text + ")";
 }
 

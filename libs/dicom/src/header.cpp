@@ -211,7 +211,7 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.series_number = meta->Get(DC::SeriesNumber).AsInt();
   h.acquisition = meta->Get(DC::AcquisitionNumber).AsInt();
   h.instance = meta->Get(DC::InstanceNumber).AsInt();
-  h.temporal = text_of(meta, DC::TemporalPositionIdentifier) + "/" + text_of(meta, DC::TriggerTime);
+  h.temporal = text_of(meta, DC::TemporalPositionIdentifier) + "/" + text_of(meta, DC::TriggerTime) + "/" + text_of(meta, DC::KVP);
   h.thickness_mm = meta->Get(DC::SliceThickness).AsDouble();
   h.spacing_tag_mm = meta->Get(DC::SpacingBetweenSlices).AsDouble();
   h.has_tilt_tag = meta->Get(DC::GantryDetectorTilt).GetNumberOfValues() > 0;

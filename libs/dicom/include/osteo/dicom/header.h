@@ -33,7 +33,7 @@ struct DicomHeader {
 
   std::string sop_class, modality, image_type, description, kernel, manufacturer, transfer_syntax;
   int series_number = 0, acquisition = 0, instance = 0;
-  std::string temporal;  ///< temporal position and trigger time
+  std::string temporal;  ///< temporal position, trigger time, tube voltage: what tells two pictures of one place apart
   double thickness_mm = 0, tilt_tag_deg = 0, spacing_tag_mm = 0;
   bool has_tilt_tag = false, lossy = false;
 
