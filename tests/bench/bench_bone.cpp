@@ -17,6 +17,7 @@
 #include <functional>
 #include <random>
 
+#include "ball.h"
 #include "bench.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/grid/resample.h"
@@ -39,23 +40,6 @@ double seconds(const std::function<void()>& f, int repeats = 3) {
 }
 
 constexpr double kRadius = 20.3;
-
-// A ball of 1000 HU with an edge as soft as a scanner's.
-Image ball(double spacing_z) {
-  Frame f;
-  f.dims = {60, 60, static_cast<int>(60 / spacing_z)};
-  f.spacing_mm = {1, 1, spacing_z};
-  f.origin_mm = {-29.7, -29.4, -29.8};
-  const auto v = make_voxels<std::int16_t>(f.voxel_count());
-  std::size_t at = 0;
-  for (int k = 0; k < f.dims[2]; ++k)
-    for (int j = 0; j < f.dims[1]; ++j)
-      for (int i = 0; i < f.dims[0]; ++i) {
-        v[at++] = static_cast<std::int16_t>(
-            std::lround(500 + 500 * std::tanh((kRadius - length(f.world_from_index({double(i), double(j), double(k)}))) / 1.5)));
-      }
-  return {f, v};
-}
 
 struct Off {
   double mean = 0, p99 = 0;
@@ -90,7 +74,7 @@ void bench_resample(const Context& context) {
       "boundary off, mean mm | p99 mm |\n|---|---|---|---|---|---|---|\n");
   const double exact = 4.0 / 3 * M_PI * std::pow(kRadius, 3);
   for (const double z : {1.0, 2.0}) {
-    const Image ct = ball(z);
+    const Image ct = test::ball(z, kRadius);
     ThresholdParams t;
     t.lower = 500;
     const Labels mask = threshold(ct, t);
@@ -130,7 +114,7 @@ void bench_resample(const Context& context) {
 }
 
 void bench_surface(const Context& context) {
-  const Image ct = ball(1);
+  const Image ct = test::ball(1, kRadius);
   ThresholdParams t;
   t.lower = 500;
   ResampleParams r;

@@ -293,7 +293,8 @@ void bench_import(const Context& context) {
     d.putAndInsertString(DCM_ImagePositionPatient, p.c_str());
   });
   std::printf(
-      "\n600 slices of 512x512, 0.5 mm apart (315 MB), to sparse bone of 0.5 mm.\n\n| what | who | wall s | CPU s | peak MB |\n|---|---|---|---|---|\n");
+      "\n600 slices of 512x512, 0.5 mm apart (315 MB), to sparse bone of 0.5 mm.\n\n| what | who | wall s | CPU s | peak MB "
+      "|\n|---|---|---|---|---|\n");
   row("sparse bone", "osteo import-bone", measure(2, [&] {
         ImportBoneParams p;
         return import_bone(large, p).density.active_voxels > 0;

@@ -460,10 +460,12 @@ class Placer {
     }
     const bool uneven = v.gap_max_mm - v.gap_min_mm > 2 * kSamePlaceMm && !p.even;
     if (uneven && !v.has(code::slices_missing) && !v.has(code::hole_too_wide)) {
-      v.add(code::gaps_uneven, Severity::warning,
-            "the slices are unevenly spaced (" + mm(v.gap_min_mm) + " to " + mm(v.gap_max_mm) +
-                "); they are interpolated between their true places",
-            "fine structures between slices " + mm(v.gap_max_mm) + " apart are not in the scan");
+      // Positions rounded to a tenth of a millimetre are common, and no reason to worry anybody.
+      const bool rounding = v.gap_max_mm - v.gap_min_mm < std::min(0.11, 0.2 * v.gap_usual_mm);
+      v.add(code::gaps_uneven, rounding ? Severity::info : Severity::warning,
+            "the slices are " + std::string(rounding ? "slightly " : "") + "unevenly spaced (" + mm(v.gap_min_mm) + " to " +
+                mm(v.gap_max_mm) + "); they are interpolated between their true places",
+            rounding ? "" : "fine structures between slices " + mm(v.gap_max_mm) + " apart are not in the scan");
     }
   }
 

@@ -47,27 +47,29 @@ inline Vec3 position_of(DcmItem& item) {
 inline const std::vector<fs::path>& straight_series() {
   static const std::vector<fs::path> files = [] {
     const fs::path real = data("dicom_ct_skull_phantom") / "S21570" / "S2030", to = scratch("straight");
-    if (!fs::exists(real)) {
+    std::vector<fs::path> source;
+    if (fs::exists(real)) {
+      std::vector<std::pair<double, fs::path>> sorted;
+      for (const auto& f : files_in(real)) {
+        DcmFileFormat file;
+        if (file.loadFile(f.c_str(), EXS_Unknown, EGL_noChange, 64).bad() || !file.getDataset()->tagExists(DCM_Rows)) continue;
+        sorted.emplace_back(position_of(*file.getDataset()).z, f);
+      }
+      std::sort(sorted.begin(), sorted.end());
+      for (std::size_t i = 40; i < 100; ++i) source.push_back(sorted[i].second);
+    } else {
       PhantomParams p;
       p.region = PhantomRegion::temporal;
       p.spacing_mm = 1;
       save_dicom_series(make_phantom(p).ct, to / "all");
-      auto all = files_in(to / "all");
-      all.resize(60);
-      return all;
+      source = files_in(to / "all");
+      source.resize(60);
     }
-    std::vector<std::pair<double, fs::path>> sorted;
-    for (const auto& f : files_in(real)) {
-      DcmFileFormat file;
-      if (file.loadFile(f.c_str(), EXS_Unknown, EGL_noChange, 64).bad() || !file.getDataset()->tagExists(DCM_Rows)) continue;
-      sorted.emplace_back(position_of(*file.getDataset()).z, f);
-    }
-    std::sort(sorted.begin(), sorted.end());
     std::vector<fs::path> result;
-    for (int i = 40; i < 100; ++i) {
+    for (std::size_t i = 0; i < source.size(); ++i) {
       char name[16];
-      std::snprintf(name, sizeof name, "%03d", i - 40);
-      fs::create_symlink(sorted[static_cast<std::size_t>(i)].second, to / name);
+      std::snprintf(name, sizeof name, "%03d", static_cast<int>(i));
+      fs::create_symlink(source[i], to / name);
       result.push_back(to / name);
     }
     return result;
