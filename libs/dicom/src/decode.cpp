@@ -43,6 +43,9 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
     }
     return {};
   }
+  // Markers up to the scan must follow each other without a gap: GDCM's decoders abort on some pictures that libjpeg patches up.
+  Shape shape;
+  bool tables = false;
   std::size_t at = 2;
   while (at + 10 < n) {
     if (p[at] != static_cast<char>(0xFF)) return {};
@@ -51,10 +54,16 @@ Shape shape_of(std::span<const char> bytes, bool jpeg2000) {
       ++at;
       continue;
     }
-    const bool frame = (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || marker == 0xF7;
-    if (frame) return {u16(p + at + 7), u16(p + at + 5), static_cast<unsigned char>(p[at + 9]), static_cast<unsigned char>(p[at + 4])};
-    if (marker == 0xDA || marker == 0xD9) return {};
-    at += 2 + u16(p + at + 2);
+    const bool jpeg_ls = marker == 0xF7;
+    const bool frame = (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || jpeg_ls;
+    if (frame && shape.width > 0) return {};
+    if (frame) shape = {u16(p + at + 7), u16(p + at + 5), static_cast<unsigned char>(p[at + 9]), static_cast<unsigned char>(p[at + 4])};
+    tables = tables || jpeg_ls || marker == 0xC4;
+    if (marker == 0xDA) return tables && p[at + 4] == 1 ? shape : Shape{};
+    if (marker == 0xD9) return {};
+    const unsigned length = u16(p + at + 2);
+    if (length < 2) return {};
+    at += 2 + length;
   }
   return {};
 }

@@ -126,7 +126,7 @@ StageInfo ImportStage::info() {
           "each slice where its own position says. Even, straight slices are taken voxel for voxel; a tilted gantry or uneven distances "
           "are resampled onto upright slices. What cannot be placed rightly is refused. Beside the output a verdict (JSON) says what was "
           "found, which slice came from which file, and what a person should do. 'osteo import --list FOLDER' shows the series.",
-      .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, file or zip, or a volume file"}},
+      .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, zip, or one slice of a series, or a volume file"}},
       .outputs = {{"image", {DataKind::image}, "CT in HU"},
                   {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
       .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module", "DICOM PS3.3 C.7.6.16, Multi-frame Functional Groups"},

@@ -190,13 +190,25 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
   DicomScan scan;
   scan.scratch = std::make_shared<TemporaryFolder>();
   std::vector<Found> found;
+  std::string only_series;
   if (fs::is_directory(source)) {
     found = files_below(source, scan.set_aside);
   } else if (is_archive(source)) {
     for (auto& u : dicom::unpack(source, scan.scratch->path(), context.sub(0, 0.4))) found.push_back({u.file, u.name});
     std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
   } else {
-    if (read_dicom_header(source, scan.scratch->path()).sop_class == kIndex) found = files_of_index(source, scan.set_aside);
+    const DicomHeader one = read_dicom_header(source, scan.scratch->path());
+    if (one.sop_class == kIndex) found = files_of_index(source, scan.set_aside);
+    if (one.usable() && one.frames.size() == 1 && !one.series_uid.empty()) {
+      // One slice stands for its series: the files beside it that belong to it.
+      only_series = one.series_uid;
+      const fs::path folder = source.has_parent_path() ? source.parent_path() : fs::path(".");
+      std::error_code ec;
+      for (const auto& e : fs::directory_iterator(folder, ec)) {
+        if (e.is_regular_file(ec)) found.push_back({e.path(), e.path().filename().string()});
+      }
+      std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.name < b.name; });
+    }
     if (found.empty()) found.push_back({source, source.filename().string()});
   }
   scan.files = found.size();
@@ -225,6 +237,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
   std::map<std::string, std::size_t> group;
   for (std::size_t i = 0; i < headers.size(); ++i) {
     DicomHeader& h = headers[i];
+    if (!only_series.empty() && h.series_uid != only_series) continue;
     h.name = without_identity(h.name, identifying, number_of(i));
     const bool alone = h.frames.empty() && !h.usable() && h.problem_code != code::pixels_damaged;
     if (alone) {

@@ -95,6 +95,22 @@ TEST(Dicom, DecodingInParallelGivesTheSameVoxels) {
   }
 }
 
+TEST(Dicom, OneSliceStandsForItsSeries) {
+  const auto folder = scratch("one");
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 4;
+  save_dicom_series(make_phantom(p).ct, folder / "a");
+  p.spacing_mm = 3;
+  save_dicom_series(make_phantom(p).ct, folder / "b");
+  const auto a = test::files_in(folder / "a"), b = test::files_in(folder / "b");
+  for (const auto& f : a) fs::rename(f, folder / "b" / ("a" + f.filename().string()));
+  const Imported r = import_ct(folder / "b" / ("a" + a[3].filename().string()), {});
+  EXPECT_EQ(r.verdict.slices.size(), a.size());
+  EXPECT_EQ(r.verdict.slices[0].file[0], 'a');
+  EXPECT_TRUE(r.verdict.set_aside.empty());
+}
+
 TEST(Dicom, ADicomdirLeadsToItsFiles) {
   const auto folder = scratch("index");
   PhantomParams p;

@@ -35,7 +35,8 @@ struct DicomScan {
   std::shared_ptr<TemporaryFolder> scratch;  ///< keeps unpacked and rewritten files until the pixels are read
 };
 
-/// `source`: a folder (any depth), a DICOM file (its series is all that is read beside it when it is a DICOMDIR), or an archive
+/// `source`: a folder (any depth), a DICOMDIR, a DICOM file (one slice stands for its series: the
+/// files beside it that belong to it), or an archive
 /// (zip, tar, 7z; unpacked into the system's temporary folder). Headers are read in parallel, each once, no pixels.
 /// Names shown hold no value that identifies the patient: such a folder becomes "*",
 /// such a file "file-000012".
