@@ -1,6 +1,7 @@
 #include "osteo/base/param.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 
@@ -37,6 +38,11 @@ void check_range(const FieldRef& field, double value) {
 }
 
 }  // namespace
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 std::string format_number(double value) {
   std::array<char, 32> buffer{};

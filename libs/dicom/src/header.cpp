@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "osteo/base/param.h"
 #include "osteo/dicom/verdict.h"
 #include "rewrite.h"
 #include "sound.h"
@@ -67,16 +68,11 @@ constexpr std::array kIdentifying{DC::PatientName,
                                   DC::StudyDate,
                                   DC::IssuerOfPatientID};
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 std::vector<std::string> identifying_values(vtkDICOMMetaData* meta) {
   std::vector<std::string> values;
   const auto add = [&](const std::string& value) {
     // Shorter pieces are initials or codes that occur by chance.
-    if (value.size() >= 4) values.push_back(lower(value));
+    if (value.size() >= 4) values.push_back(lower_case(value));
   };
   for (const auto tag : kIdentifying) {
     const std::string text = text_of(meta, tag);

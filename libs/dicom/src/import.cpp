@@ -94,16 +94,8 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
     const PlaceOptions options = place_options(params);
     const DicomScan scan = scan_dicom(source, options, context.sub(0, 0.2));
     const DicomSeries& series = choose_series(scan, params.series, source.string());
-    const auto add_strays = [&](Verdict& v) { v.set_aside.insert(v.set_aside.end(), scan.set_aside.begin(), scan.set_aside.end()); };
-    try {
-      DicomVolume loaded = load_dicom_series(series, options, context.sub(0.2, 1.0));
-      result = {std::move(loaded.image), std::move(loaded.verdict)};
-    } catch (const Refused& e) {
-      Verdict v = e.verdict();
-      add_strays(v);
-      throw Refused(v, e.code());
-    }
-    add_strays(result.verdict);
+    DicomVolume loaded = load_dicom_series(series, options, context.sub(0.2, 1.0));
+    result = {std::move(loaded.image), std::move(loaded.verdict)};
   }
   if (!params.axes.empty()) {
     Frame& frame = result.image.frame;

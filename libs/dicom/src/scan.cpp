@@ -30,11 +30,6 @@ struct Found {
   std::string name;
 };
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 std::vector<Found> files_below(const fs::path& folder, std::vector<FileSetAside>& unreadable) {
   std::vector<Found> found;
   std::error_code ec;
@@ -76,9 +71,9 @@ std::vector<Found> files_of_index(const fs::path& index, std::vector<FileSetAsid
       auto& entries = listing[at];
       if (entries.empty()) {
         std::error_code ec;
-        for (const auto& e : fs::directory_iterator(at, ec)) entries[lower(e.path().filename().string())] = e.path();
+        for (const auto& e : fs::directory_iterator(at, ec)) entries[lower_case(e.path().filename().string())] = e.path();
       }
-      const auto it = entries.find(lower(piece));
+      const auto it = entries.find(lower_case(piece));
       there = there && it != entries.end();
       if (there) at = it->second;
     }
@@ -93,7 +88,7 @@ std::vector<Found> files_of_index(const fs::path& index, std::vector<FileSetAsid
 
 // A name, or free text, that holds a value which identifies the patient.
 bool identifies(const std::string& text, const std::set<std::string>& values) {
-  const std::string low = lower(text);
+  const std::string low = lower_case(text);
   return std::any_of(values.begin(), values.end(), [&](const std::string& v) { return low.find(v) != std::string::npos; });
 }
 
@@ -112,7 +107,7 @@ std::string without_identity(const std::string& name, const std::set<std::string
 }
 
 bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
-  const std::string kernel = lower(s.kernel), maker = lower(manufacturer), text = lower(s.description);
+  const std::string kernel = lower_case(s.kernel), maker = lower_case(manufacturer), text = lower_case(s.description);
   for (const char* word : {"bone", "knochen", "osseux", "hueso", "osso", "petr", "temporal", "mastoid", "iac", "edge", "sharp"}) {
     if (text.find(word) != std::string::npos || kernel.find(word) != std::string::npos) return true;
   }
@@ -175,7 +170,7 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
 }  // namespace
 
 bool is_archive(const fs::path& file) {
-  const std::string name = lower(file.filename().string());
+  const std::string name = lower_case(file.filename().string());
   for (const char* suffix : {".zip", ".tar", ".tgz", ".tar.gz", ".tar.xz", ".tar.bz2", ".7z"}) {
     if (name.ends_with(suffix)) return true;
   }
@@ -252,6 +247,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
   for (FileSetAside& f : scan.set_aside) {
     f.file = without_identity(f.file, identifying, "(name removed)");
   }
+  const auto strays = std::make_shared<const std::vector<FileSetAside>>(scan.set_aside);
   // Pictures that could be of no volume go by name: a whole series of them is still worth a line.
   std::vector<double> price(scan.series.size(), 1e30);
   for (std::size_t i = 0; i < scan.series.size(); ++i) {
@@ -268,6 +264,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     s.pixel_mm = h.frames.empty() ? 0 : h.frames.front().column_spacing_mm;
     s.thickness_mm = h.thickness_mm;
     for (const auto& each : s.headers) s.images += static_cast<int>(each.frames.size());
+    s.strays = strays;
     judge(s, options, price[i]);
     context.progress(0.9 + 0.1 * static_cast<double>(i + 1) / static_cast<double>(scan.series.size()), "sorting");
   }

@@ -17,7 +17,6 @@
 #include "dcmtk_tools.h"
 #include "osteo/base/param.h"
 #include "osteo/dicom/objects.h"
-#include "osteo/io/volume_io.h"
 
 namespace osteo {
 namespace {
@@ -255,7 +254,6 @@ void save_segmentation_on_source(const Labels& labels, const fs::path& path, con
 
 bool is_segmentation(const fs::path& path) {
   dicom::quiet_dcmtk();
-  DcmMetaInfo meta;
   OFString uid;
   DcmFileFormat file;
   if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_metaOnly).bad()) return false;

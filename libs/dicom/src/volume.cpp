@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 #include "osteo/base/parallel.h"
 #include "osteo/base/param.h"
@@ -42,6 +41,7 @@ Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options
                              [&](std::size_t a, std::size_t b) { return dicom::same_stored_pixels(series.headers[a], series.headers[b]); });
   if (p.verdict.series == 0) p.verdict.series = series.number;
   if (p.verdict.modality.empty()) p.verdict.modality = series.modality;
+  if (series.strays) p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
   p.verdict.why_chosen = series.recommended ? series.why : "asked for";
   if (p.verdict.refused()) {
     const std::string& code = first_error(p.verdict).code;

@@ -169,22 +169,13 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
   const DicomSeries& series = choose_series(scan, p.source.series, source.string());
   BoneBuilder builder(p, context);
   ImportedBone result;
-  const auto add_strays = [&](Verdict v) {
-    v.set_aside.insert(v.set_aside.end(), scan.set_aside.begin(), scan.set_aside.end());
-    return v;
-  };
-  Frame frame;
-  try {
-    DicomSlabs slabs(series, options, p.spacing_mm);
-    slabs.run(kLayers, context.sub(0.1, 0.95), [&](int first, int layers, const std::int16_t* slab) {
-      if (first == 0) builder.begin(slabs.frame());
-      builder.take(first, layers, slab);
-    });
-    frame = slabs.frame();
-    result.verdict = add_strays(slabs.verdict());
-  } catch (const Refused& e) {
-    throw Refused(add_strays(e.verdict()), e.code());
-  }
+  DicomSlabs slabs(series, options, p.spacing_mm);
+  slabs.run(kLayers, context.sub(0.1, 0.95), [&](int first, int layers, const std::int16_t* slab) {
+    if (first == 0) builder.begin(slabs.frame());
+    builder.take(first, layers, slab);
+  });
+  const Frame& frame = slabs.frame();
+  result.verdict = slabs.verdict();
   tell_verdict(result.verdict, context);
   const auto [found, kept] = builder.drop_small_pieces();
   if (kept == 0) {

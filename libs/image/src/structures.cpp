@@ -37,8 +37,7 @@ std::map<int, std::string> parse_names(const std::string& text) {
 
 // Nerves yellow, arteries red, veins blue, as atlases have it; the rest in turn.
 std::array<std::uint8_t, 3> colour_for(const std::string& name, std::size_t n) {
-  std::string low = name;
-  std::transform(low.begin(), low.end(), low.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string low = lower_case(name);
   const auto has = [&](const char* word) { return low.find(word) != std::string::npos; };
   if (has("nerve") || has("nerv") || has("chorda")) return {244, 214, 49};
   if (has("arter") || has("carotid")) return {216, 60, 50};

@@ -87,11 +87,6 @@ std::vector<double> numbers_in(std::string_view text) {
   return out;
 }
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t size, const fs::path& path) {
   z_stream z{};
   if (inflateInit2(&z, 15 + 32) != Z_OK) fail(path, "cannot start decompression");
@@ -141,7 +136,7 @@ RawVolume read_nrrd(const fs::path& path) {
     }
     std::string_view value = line.substr(colon + 1);
     while (value.starts_with(' ') || value.starts_with('\t')) value.remove_prefix(1);
-    fields[lower(std::string(line.substr(0, colon)))] = std::string(value);
+    fields[lower_case(std::string(line.substr(0, colon)))] = std::string(value);
   }
   const auto get = [&](std::string_view key) {
     const auto it = fields.find(key);
@@ -154,7 +149,7 @@ RawVolume read_nrrd(const fs::path& path) {
   if (type == kTypes.end()) fail(path, "the scalar type '" + get("type") + "' is not supported");
   raw.type = type->second;
   auto sizes = numbers_in(get("sizes"));
-  const std::string kinds = lower(get("kinds"));
+  const std::string kinds = lower_case(get("kinds"));
   if (sizes.size() == 4 && (kinds.starts_with("list ") || kinds.starts_with("vector "))) {
     if (!(sizes[0] >= 1 && sizes[0] <= 255)) fail(path, "it has " + format_number(sizes[0]) + " layers");
     raw.layers = static_cast<int>(sizes[0]);
@@ -169,7 +164,7 @@ RawVolume read_nrrd(const fs::path& path) {
   }
 
   // World axes: LPS unless the header says RAS or LAS.
-  const std::string space = lower(get("space"));
+  const std::string space = lower_case(get("space"));
   Vec3 to_lps{1, 1, 1};
   if (space == "ras" || space == "right-anterior-superior") to_lps = {-1, -1, 1};
   if (space == "las" || space == "left-anterior-superior") to_lps = {1, -1, 1};
@@ -211,7 +206,7 @@ RawVolume read_nrrd(const fs::path& path) {
     body = std::span(bytes).subspan(at + 1);
   }
   const auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
-  const std::string encoding = lower(get("encoding"));
+  const std::string encoding = lower_case(get("encoding"));
   if (encoding == "raw") {
     if (body.size() < size) {
       fail(path, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(size),
@@ -223,7 +218,7 @@ RawVolume read_nrrd(const fs::path& path) {
   } else {
     fail(path, "the encoding '" + encoding + "' is not supported", "save it with gzip or raw encoding");
   }
-  const bool big = lower(get("endian")) == "big";
+  const bool big = lower_case(get("endian")) == "big";
   if (scalar > 1 && big != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < size; i += scalar) std::reverse(voxels.get() + i, voxels.get() + i + scalar);
   }

@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/param.h"
 #include "raw_volume.h"
 #include "seg_notes.h"
 
@@ -28,8 +29,7 @@ constexpr std::array<Format, 7> kFormats{{
 }};
 
 const Format* format_of(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower_case(path.filename().string());
   for (const Format& f : kFormats) {
     if (name.size() > f.suffix.size() && name.ends_with(f.suffix)) return &f;
   }

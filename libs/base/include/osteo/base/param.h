@@ -69,6 +69,8 @@ template <class S>
 /// The entry of `known` nearest to `word` by edit distance, or empty when nothing is near.
 [[nodiscard]] std::string nearest_name(std::string_view word, std::span<const std::string> known);
 
+/// ASCII letters in lower case.
+[[nodiscard]] std::string lower_case(std::string text);
 /// Shortest text that reads back to the same double; no locale.
 [[nodiscard]] std::string format_number(double value);
 /// Strict: the whole text must be a finite number. Throws Error(usage) naming `what`.

@@ -26,6 +26,7 @@ struct DicomSeries {
   bool recommended = false;  ///< taken when nothing is asked for
   std::string why;           ///< why it is recommended
   std::vector<DicomHeader> headers;
+  std::shared_ptr<const std::vector<FileSetAside>> strays;  ///< the scan's set_aside: part of every verdict on it; may be null
 };
 
 struct DicomScan {
