@@ -1,0 +1,370 @@
+#include "osteo/distance/distance_map.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <memory>
+
+#include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
+#include "tree_data.h"
+
+namespace osteo {
+namespace {
+
+using distance::FilterTask;
+using distance::Kernel;
+
+constexpr int kBlock = 16;  // work is done in cubes of 16^3 voxels
+constexpr std::uint32_t kNone = ClosestPoint::kNone;
+
+// One thread's memory. Grows to what the largest block needs and stays.
+struct Scratch {
+  std::vector<float> floats;
+  std::vector<std::uint32_t> packs, ids;
+  struct Level {
+    std::array<std::vector<std::uint32_t>, 8> lists;
+  };
+  std::array<Level, 4> levels;  // children of edge 8, 4, 2, 1
+  // Single voxels with their few triangles, measured many at a time.
+  std::vector<std::uint32_t> pair_id, pair_voxel;
+  std::vector<double> px, py, pz, d2;
+  std::array<double, kBlock * kBlock * kBlock> best_d2;
+  std::array<std::uint32_t, kBlock * kBlock * kBlock> best_id;
+};
+
+std::size_t padded(std::size_t n) { return (n + 15) / 16 * 16; }
+
+class BlockMapper {
+ public:
+  BlockMapper(const TriangleTree::Data& tree, const Frame& frame, Scratch& scratch)
+      : tree_(tree), kernel_(distance::kernel()), s_(scratch), origin_(tree.to_tree(frame.origin_mm)), step_(frame.spacing_mm / tree.unit_mm) {}
+
+  // Nearest triangles of the wanted voxels of the block at `lo`: wanted[16 * z + y] has bit x. Leaves them in scratch.
+  // Voxels farther than `reach` (tree units) from everything may be left without.
+  void run(std::array<int, 3> lo, const std::array<std::uint16_t, 256>& wanted, double reach, std::uint32_t& hint) {
+    lo_ = lo;
+    wanted_ = &wanted;
+    reach_ = static_cast<float>(reach);
+    s_.best_d2.fill(std::numeric_limits<double>::infinity());
+    s_.best_id.fill(kNone);
+    s_.pair_id.clear();
+    s_.pair_voxel.clear();
+    const float half[3] = {half_of(kBlock, 0), half_of(kBlock, 1), half_of(kBlock, 2)};
+    const Vec3 centre = centre_of({0, 0, 0}, kBlock);
+    const double c[3] = {centre.x, centre.y, centre.z};
+    const double radius = std::sqrt(double(half[0]) * half[0] + double(half[1]) * half[1] + double(half[2]) * half[2]);
+    const double limit = std::isfinite(reach) ? (reach + radius) * 1.00001 + tree_.view.margin : 1e150;
+    const distance::Nearest nearest = kernel_.closest(tree_.view, c, hint, limit * limit);
+    if (nearest.triangle == kNone) return;
+    hint = nearest.triangle;
+    const Vec3 place = distance::place_on(tree_.exact[nearest.triangle], centre).point;
+    const Vec3 g = normalized(centre - place);
+    const distance::Pivot pivot{static_cast<float>(std::sqrt(nearest.d2)), {static_cast<float>(g.x), static_cast<float>(g.y), static_cast<float>(g.z)}};
+    const float cf[3] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+    s_.packs.resize(tree_.records.size() / 16 + 16);
+    const int packs = kernel_.collect(tree_.view, cf, half, pivot, s_.packs.data());
+    std::sort(s_.packs.begin(), s_.packs.begin() + packs);
+    s_.ids.clear();
+    for (int p = 0; p < packs; ++p) {
+      const std::uint32_t first = s_.packs[static_cast<std::size_t>(p)] * 16;
+      for (std::uint32_t i = 0; i < 16 && first + i < tree_.view.triangles; ++i) s_.ids.push_back(first + i);
+    }
+    const std::size_t count = s_.ids.size();
+    s_.ids.resize(padded(count), s_.ids.empty() ? 0 : s_.ids.back());
+    descend({0, 0, 0}, kBlock, s_.ids.data(), count, 0);
+    measure_pairs();
+  }
+
+ private:
+  [[nodiscard]] float half_of(int edge, std::size_t axis) const { return static_cast<float>((edge - 1) / 2.0 * step_[axis]) * 1.000001F; }
+  [[nodiscard]] Vec3 centre_of(std::array<int, 3> at, int edge) const {
+    const double h = (edge - 1) / 2.0;
+    return {origin_.x + (lo_[0] + at[0] + h) * step_.x, origin_.y + (lo_[1] + at[1] + h) * step_.y, origin_.z + (lo_[2] + at[2] + h) * step_.z};
+  }
+  [[nodiscard]] bool any_wanted(std::array<int, 3> at, int edge) const {
+    const auto mask = static_cast<std::uint16_t>(((1U << edge) - 1U) << at[0]);
+    for (int z = at[2]; z < at[2] + edge; ++z) {
+      for (int y = at[1]; y < at[1] + edge; ++y) {
+        if (((*wanted_)[static_cast<std::size_t>(16 * z + y)] & mask) != 0) return true;
+      }
+    }
+    return false;
+  }
+
+  // The cube of `edge` voxels at `at` with triangles that may be nearest to some of its voxels.
+  void descend(std::array<int, 3> at, int edge, const std::uint32_t* ids, std::size_t count, std::size_t level) {
+    // Short lists are measured at once: voxels side by side, triangle after triangle. The thresholds are where the two
+    // ways cost the same.
+    const std::size_t direct = edge == 2 ? 8 : edge == 4 ? 5 : edge == 8 ? 3 : 1;
+    if (count <= direct) {
+      measure_block(at, edge, ids, count);
+      return;
+    }
+    const int child = edge / 2;
+    FilterTask task{};
+    task.records = tree_.view.records;
+    task.ids = ids;
+    task.count = static_cast<int>(count);
+    task.margin = tree_.view.margin;
+    task.wanted = 0;
+    const std::size_t room = padded(count);
+    if (s_.floats.size() < 20 * room) s_.floats.resize(20 * room);
+    task.scratch = s_.floats.data();
+    std::array<std::array<int, 3>, 8> place;
+    for (unsigned k = 0; k < 8; ++k) {
+      place[k] = {at[0] + static_cast<int>(k & 1U) * child, at[1] + static_cast<int>(k >> 1 & 1U) * child, at[2] + static_cast<int>(k >> 2) * child};
+      if (!any_wanted(place[k], child)) continue;
+      task.wanted |= 1U << k;
+      const Vec3 c = centre_of(place[k], child);
+      for (std::size_t a = 0; a < 3; ++a) task.centre[k][a] = static_cast<float>(c[a]);
+      auto& list = s_.levels[level].lists[k];
+      if (list.size() < room + 16) list.resize(room + 16);
+      task.out[k] = list.data();
+    }
+    double radius = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      task.half[a] = child == 1 ? 0.0F : half_of(child, a);
+      radius += double(task.half[a]) * task.half[a];
+    }
+    radius = std::sqrt(radius) * 1.00001;
+    kernel_.filter(task);
+    for (unsigned k = 0; k < 8; ++k) {
+      if ((task.wanted >> k & 1U) == 0) continue;
+      if (task.lowest[k] - static_cast<float>(radius) > reach_) continue;
+      const auto n = static_cast<std::size_t>(task.out_count[k]);
+      std::uint32_t* const list = task.out[k];
+      if (child == 1) {
+        const std::uint32_t v = voxel_of(place[k]);
+        for (std::size_t i = 0; i < n; ++i) {
+          s_.pair_id.push_back(list[i]);
+          s_.pair_voxel.push_back(v);
+        }
+      } else {
+        for (std::size_t i = n; i < padded(n); ++i) list[i] = list[n - 1];
+        descend(place[k], child, list, n, level + 1);
+      }
+    }
+  }
+
+  [[nodiscard]] static std::uint32_t voxel_of(std::array<int, 3> at) { return static_cast<std::uint32_t>((at[2] * 16 + at[1]) * 16 + at[0]); }
+
+  void measure_block(std::array<int, 3> at, int edge, const std::uint32_t* ids, std::size_t count) {
+    std::array<double, kBlock * kBlock> x, y, z, d2;
+    std::array<std::uint32_t, kBlock * kBlock> id, voxel;
+    int n = 0;
+    const auto flush = [&] {
+      if (n == 0) return;
+      const int full = (n + 7) / 8 * 8;
+      for (int i = n; i < full; ++i) x[i] = x[n - 1], y[i] = y[n - 1], z[i] = z[n - 1];
+      for (int i = 0; i < full; ++i) d2[i] = std::numeric_limits<double>::infinity(), id[i] = kNone;
+      kernel_.measure_block(tree_.view.exact, ids, static_cast<int>(count), x.data(), y.data(), z.data(), full, d2.data(), id.data());
+      for (int i = 0; i < n; ++i) {
+        s_.best_d2[voxel[i]] = d2[i];
+        s_.best_id[voxel[i]] = id[i];
+      }
+      n = 0;
+    };
+    for (int c = at[2]; c < at[2] + edge; ++c) {
+      for (int b = at[1]; b < at[1] + edge; ++b) {
+        const unsigned row = (*wanted_)[static_cast<std::size_t>(16 * c + b)];
+        for (int a = at[0]; a < at[0] + edge; ++a) {
+          if ((row >> a & 1U) == 0) continue;
+          const Vec3 p = centre_of({a, b, c}, 1);
+          x[n] = p.x, y[n] = p.y, z[n] = p.z;
+          voxel[n++] = voxel_of({a, b, c});
+        }
+        if (n > kBlock * kBlock - kBlock) flush();
+      }
+    }
+    flush();
+  }
+
+  void measure_pairs() {
+    const std::size_t n = s_.pair_id.size();
+    if (n == 0) return;
+    const std::size_t full = (n + 7) / 8 * 8;
+    s_.pair_id.resize(full, s_.pair_id.back());
+    for (auto* v : {&s_.px, &s_.py, &s_.pz, &s_.d2}) {
+      if (v->size() < full) v->resize(full);
+    }
+    for (std::size_t i = 0; i < full; ++i) {
+      const std::uint32_t v = s_.pair_voxel[std::min(i, n - 1)];
+      const Vec3 p = centre_of({static_cast<int>(v & 15U), static_cast<int>(v >> 4 & 15U), static_cast<int>(v >> 8)}, 1);
+      s_.px[i] = p.x, s_.py[i] = p.y, s_.pz[i] = p.z;
+    }
+    kernel_.measure_pairs(tree_.view.exact, s_.pair_id.data(), s_.px.data(), s_.py.data(), s_.pz.data(), static_cast<int>(full), s_.d2.data());
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::uint32_t v = s_.pair_voxel[i];
+      if (s_.d2[i] < s_.best_d2[v] || (s_.d2[i] == s_.best_d2[v] && s_.pair_id[i] < s_.best_id[v])) {
+        s_.best_d2[v] = s_.d2[i];
+        s_.best_id[v] = s_.pair_id[i];
+      }
+    }
+  }
+
+  const TriangleTree::Data& tree_;
+  const Kernel& kernel_;
+  Scratch& s_;
+  Vec3 origin_, step_;
+  std::array<int, 3> lo_{};
+  const std::array<std::uint16_t, 256>* wanted_ = nullptr;
+  float reach_ = 0;
+};
+
+struct BlockResult {
+  std::vector<Ijk> bricks;
+  std::vector<std::uint64_t> stored;
+  std::vector<double> distance_mm;
+  std::vector<std::uint32_t> triangle;
+};
+
+}  // namespace
+
+std::uint64_t DistanceMap::count() const {
+  std::uint64_t sum = 0;
+  for (const auto w : stored) sum += static_cast<std::uint64_t>(std::popcount(w));
+  return sum;
+}
+
+std::int64_t DistanceMap::find(int i, int j, int k) const {
+  const Ijk b{i >> 3, j >> 3, k >> 3};
+  const auto before = [](const Ijk& x, const Ijk& y) { return x.k != y.k ? x.k < y.k : x.j != y.j ? x.j < y.j : x.i < y.i; };
+  const auto it = std::lower_bound(bricks.begin(), bricks.end(), b, before);
+  if (it == bricks.end() || !(*it == b)) return -1;
+  const auto brick = static_cast<std::size_t>(it - bricks.begin());
+  if ((stored[brick * 8 + static_cast<std::size_t>(k & 7)] >> ((i & 7) + 8 * (j & 7)) & 1U) == 0) return -1;
+  return static_cast<std::int64_t>(brick * 512) + (i & 7) + 8 * (j & 7) + 64 * (k & 7);
+}
+
+DistanceMapper::DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context) : frame_(frame) {
+  require_valid(frame);
+  tree_ = TriangleTree(soup, frame.direction, context.sub(0, 0.5));
+  inside_ = voxels_inside(soup, frame, context.sub(0.5, 1), &report_);
+}
+
+DistanceMap DistanceMapper::map(const DistanceMapOptions& options, const Context& context) const {
+  constexpr double kEverything = std::numeric_limits<double>::infinity();
+  switch (options.region) {
+    case DistanceRegion::box:
+      return run(nullptr, kEverything, kEverything, context);
+    case DistanceRegion::interior:
+      return run(&inside_, kEverything, kEverything, context);
+    case DistanceRegion::band:
+      break;
+  }
+  return run(nullptr, options.band_inside_mm, options.band_outside_mm, context);
+}
+
+DistanceMap DistanceMapper::map(const VoxelBits& wanted, const Context& context) const {
+  constexpr double kEverything = std::numeric_limits<double>::infinity();
+  return run(&wanted, kEverything, kEverything, context);
+}
+
+DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, double outside_mm, const Context& context) const {
+  const TriangleTree::Data& tree = tree_.data();
+  const auto& dims = frame_.dims;
+  const auto blocks = [&](std::size_t a) { return static_cast<std::size_t>((dims[a] + kBlock - 1) / kBlock); };
+  const std::size_t rows = blocks(1) * blocks(2);
+  std::vector<BlockResult> results(rows);
+  std::atomic<std::size_t> done{0};
+  parallel_for(rows, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    thread_local std::unique_ptr<Scratch> scratch;
+    if (scratch == nullptr) scratch = std::make_unique<Scratch>();
+    BlockMapper mapper(tree, frame_, *scratch);
+    for (std::size_t r = begin; r < end; ++r) {
+      context.check_cancelled();
+      BlockResult& out = results[r];
+      std::uint32_t hint = 0;  // each row for itself: the result must not depend on who did what before
+      for (std::size_t bx = 0; bx < blocks(0); ++bx) {
+        const std::array<int, 3> lo{static_cast<int>(bx) * kBlock, static_cast<int>(r % blocks(1)) * kBlock, static_cast<int>(r / blocks(1)) * kBlock};
+        // 16 divides 64: a block's bits lie in one word of each row.
+        const auto read = [&](const VoxelBits& bits, int j, int k) {
+          return static_cast<std::uint16_t>(bits.words[bits.row(j, k) + static_cast<std::size_t>(lo[0]) / 64] >> (lo[0] % 64));
+        };
+        const auto in_box = static_cast<std::uint16_t>(dims[0] - lo[0] >= 16 ? 0xffff : (1 << (dims[0] - lo[0])) - 1);
+        std::array<std::uint16_t, 256> want{}, in{};
+        unsigned any = 0, any_in = 0, any_out = 0;
+        for (int z = 0; z < std::min(kBlock, dims[2] - lo[2]); ++z) {
+          for (int y = 0; y < std::min(kBlock, dims[1] - lo[1]); ++y) {
+            const auto at = static_cast<std::size_t>(16 * z + y);
+            in[at] = read(inside_, lo[1] + y, lo[2] + z);
+            want[at] = wanted != nullptr ? read(*wanted, lo[1] + y, lo[2] + z) : in_box;
+            any |= want[at];
+            any_in |= static_cast<unsigned>(want[at] & in[at]);
+            any_out |= static_cast<unsigned>(want[at] & ~in[at]);
+          }
+        }
+        if (any == 0) continue;
+        const double reach = std::max(any_in != 0 ? inside_mm : 0.0, any_out != 0 ? outside_mm : 0.0) / tree.unit_mm;
+        mapper.run(lo, want, reach, hint);
+        for (int b = 0; b < 8; ++b) {
+          const int ox = (b & 1) * 8, oy = (b >> 1 & 1) * 8, oz = (b >> 2) * 8;
+          std::array<std::uint64_t, 8> stored{};
+          std::uint64_t some = 0;
+          for (int z = 0; z < 8; ++z) {
+            for (int y = 0; y < 8; ++y) {
+              const auto at = static_cast<std::size_t>(16 * (oz + z) + oy + y);
+              const unsigned w = want[at] >> ox & 0xffU;
+              if (w == 0) continue;
+              for (unsigned rest = w; rest != 0; rest &= rest - 1) {
+                const int x = std::countr_zero(rest);
+                const std::size_t v = at * 16 + static_cast<std::size_t>(ox + x);
+                if (scratch->best_id[v] == kNone) continue;
+                const double d = std::sqrt(scratch->best_d2[v]) * tree.unit_mm;
+                if (d <= ((in[at] >> (ox + x) & 1U) != 0 ? inside_mm : outside_mm)) stored[static_cast<std::size_t>(z)] |= 1ULL << (x + 8 * y);
+              }
+            }
+            some |= stored[static_cast<std::size_t>(z)];
+          }
+          if (some == 0) continue;
+          out.bricks.push_back({(lo[0] + ox) / 8, (lo[1] + oy) / 8, (lo[2] + oz) / 8});
+          out.stored.insert(out.stored.end(), stored.begin(), stored.end());
+          const std::size_t base = out.distance_mm.size();
+          out.distance_mm.resize(base + 512, std::numeric_limits<double>::quiet_NaN());
+          out.triangle.resize(base + 512, kNone);
+          for (int z = 0; z < 8; ++z) {
+            for (std::uint64_t rest = stored[static_cast<std::size_t>(z)]; rest != 0; rest &= rest - 1) {
+              const int xy = std::countr_zero(rest), x = xy & 7, y = xy >> 3;
+              const auto at = static_cast<std::size_t>(16 * (oz + z) + oy + y);
+              const std::size_t v = at * 16 + static_cast<std::size_t>(ox + x);
+              const double d = std::sqrt(scratch->best_d2[v]) * tree.unit_mm;
+              out.distance_mm[base + static_cast<std::size_t>(64 * z + xy)] = (in[at] >> (ox + x) & 1U) != 0 ? -d : d;
+              out.triangle[base + static_cast<std::size_t>(64 * z + xy)] = tree.original[scratch->best_id[v]];
+            }
+          }
+        }
+      }
+      context.progress(static_cast<double>(++done) / static_cast<double>(rows), "measuring distances");
+    }
+  });
+  // Bricks in z, y, x order.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;
+  for (std::uint32_t r = 0; r < results.size(); ++r) {
+    for (std::uint32_t b = 0; b < results[r].bricks.size(); ++b) order.push_back({r, b});
+  }
+  std::sort(order.begin(), order.end(), [&](const auto& x, const auto& y) {
+    const Ijk a = results[x.first].bricks[x.second], b = results[y.first].bricks[y.second];
+    return a.k != b.k ? a.k < b.k : a.j != b.j ? a.j < b.j : a.i < b.i;
+  });
+  DistanceMap map;
+  map.frame = frame_;
+  map.bricks.resize(order.size());
+  map.stored.resize(order.size() * 8);
+  map.distance_mm.resize(order.size() * 512);
+  map.triangle.resize(order.size() * 512);
+  parallel_for(order.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t o = begin; o < end; ++o) {
+      const BlockResult& from = results[order[o].first];
+      const std::size_t b = order[o].second;
+      map.bricks[o] = from.bricks[b];
+      std::copy_n(from.stored.begin() + static_cast<std::ptrdiff_t>(b * 8), 8, map.stored.begin() + static_cast<std::ptrdiff_t>(o * 8));
+      std::copy_n(from.distance_mm.begin() + static_cast<std::ptrdiff_t>(b * 512), 512, map.distance_mm.begin() + static_cast<std::ptrdiff_t>(o * 512));
+      std::copy_n(from.triangle.begin() + static_cast<std::ptrdiff_t>(b * 512), 512, map.triangle.begin() + static_cast<std::ptrdiff_t>(o * 512));
+    }
+  });
+  return map;
+}
+
+}  // namespace osteo
