@@ -68,9 +68,10 @@ struct Kernel {
   const char* name;
   /// For each wanted child keeps the triangles that can be nearest to any of its points.
   void (*filter)(FilterTask&);
-  /// d2[i] of point i (px[i], py[i], pz[i]) to triangle ids[i].
-  void (*measure_pairs)(const ExactTriangle*, const std::uint32_t* ids, const double* px, const double* py, const double* pz, int count,
-                        double* d2);
+  /// d2[i] of voxel i to triangle ids[i]. A voxel is x + 16 y + 256 z; its centre is origin + step * (x, y, z).
+  /// Readable and writable up to the next multiple of 8.
+  void (*measure_voxels)(const ExactTriangle*, const std::uint32_t* ids, const std::uint32_t* voxels, int count, const double origin[3],
+                         const double step[3], double* d2);
   /// Points to all of a list of triangles: `best` is brought down where a triangle is nearer.
   void (*measure_block)(const ExactTriangle*, const std::uint32_t* ids, int count, const double* px, const double* py, const double* pz,
                         int points, double* best_d2, std::uint32_t* best_id);

@@ -1,6 +1,8 @@
 #include "kernel.h"
 
 #if defined(__x86_64__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 about its own intrinsics
 #include <immintrin.h>
 
 namespace osteo::distance {
@@ -118,7 +120,8 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
 
 }  // namespace
 
-const Kernel kAvx512{"avx512", filter, measure_pairs, measure_block, closest, collect};
+const Kernel kAvx512{"avx512", filter, measure_voxels, measure_block, closest, collect};
 
 }  // namespace osteo::distance
+#pragma GCC diagnostic pop
 #endif

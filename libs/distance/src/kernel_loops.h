@@ -185,12 +185,20 @@ inline D measure(const D* f, D px, D py, D pz) {
   return select(inside, min(h * h, edges), edges);
 }
 
-void measure_pairs(const ExactTriangle* exact, const std::uint32_t* ids, const double* px, const double* py, const double* pz, int count,
-                   double* d2) {
+void measure_voxels(const ExactTriangle* exact, const std::uint32_t* ids, const std::uint32_t* voxels, int count, const double origin[3],
+                    const double step[3], double* d2) {
+  const D ox = D::all(origin[0]), oy = D::all(origin[1]), oz = D::all(origin[2]);
+  const D sx = D::all(step[0]), sy = D::all(step[1]), sz = D::all(step[2]);
   for (int i = 0; i < count; i += kD) {
     D f[16];
-    load_exact(exact, ids + i, f);  // ids and points are readable to the next multiple of 8
-    measure(f, D::load(px + i), D::load(py + i), D::load(pz + i)).store(d2 + i);
+    load_exact(exact, ids + i, f);
+    double x[kD], y[kD], z[kD];
+    for (int l = 0; l < kD; ++l) {
+      x[l] = static_cast<double>(voxels[i + l] & 15U);
+      y[l] = static_cast<double>(voxels[i + l] >> 4 & 15U);
+      z[l] = static_cast<double>(voxels[i + l] >> 8);
+    }
+    measure(f, ox + D::load(x) * sx, oy + D::load(y) * sy, oz + D::load(z) * sz).store(d2 + i);
   }
 }
 

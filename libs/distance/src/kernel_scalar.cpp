@@ -57,6 +57,6 @@ Lanes load_records(const TriangleRecord* records, const std::uint32_t* ids) {
 }
 }  // namespace
 
-const Kernel kScalar{"scalar", filter, measure_pairs, measure_block, closest, collect};
+const Kernel kScalar{"scalar", filter, measure_voxels, measure_block, closest, collect};
 
 }  // namespace osteo::distance

@@ -1,5 +1,6 @@
 // What a TriangleTree holds. Private to libs/distance.
 #pragma once
+#include <memory>
 #include <vector>
 
 #include "kernel.h"
@@ -9,13 +10,14 @@ namespace osteo {
 
 struct TriangleTree::Data {
   distance::TreeView view{};
-  std::vector<distance::TriangleRecord> records;
-  std::vector<distance::ExactTriangle> exact;
+  std::unique_ptr<distance::TriangleRecord[]> records;
+  std::unique_ptr<distance::ExactTriangle[]> exact;
   std::vector<std::vector<distance::BoxGroup>> boxes;
   std::vector<std::uint32_t> original;  ///< tree order -> soup
   std::vector<std::uint32_t> rank;      ///< soup -> tree order
   Mat3 axes;                            ///< columns: the tree's axes in the world
   Vec3 centre_mm;
+  double area = 0;      ///< of all triangles, in units of the tree
   double unit_mm = 1;  ///< a power of two: mm to one unit of the tree
 
   [[nodiscard]] Vec3 to_tree(Vec3 world_mm) const {

@@ -49,22 +49,13 @@ ExactTriangle make_exact(Vec3 a, Vec3 b, Vec3 c) {
     turned = 1;
   }
   const Vec3 ab = b - a, ac = c - a, bc = c - b, n = cross(ab, ac);
-  const double area2 = length(n);
-  ExactTriangle e{};
+  const double l_ab = dot(ab, ab), l_ac = dot(ac, ac), l_bc = dot(bc, bc), n2 = dot(n, n);
   // Thinner than this the rounding of the normal costs more than leaving the face out.
-  const bool flat = !(area2 > 2e-11 * length(ab) * length(ac));
-  for (std::size_t i = 0; i < 3; ++i) {
-    e.a[i] = a[i];
-    e.b[i] = b[i];
-    e.c[i] = c[i];
-    e.n[i] = flat ? std::numeric_limits<double>::quiet_NaN() : n[i] / area2;
-  }
+  const bool flat = !(n2 > 4e-22 * l_ab * l_ac);
+  const double scale = flat ? std::numeric_limits<double>::quiet_NaN() : 1 / std::sqrt(n2);
   const auto inverse = [](double l2) { return l2 > 0 ? 1 / l2 : 0.0; };
-  e.inverse_ab = inverse(dot(ab, ab));
-  e.inverse_ac = inverse(dot(ac, ac));
-  e.inverse_bc = inverse(dot(bc, bc));
-  e.turned = turned;
-  return e;
+  return {{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}, {n.x * scale, n.y * scale, n.z * scale},
+          inverse(l_ab),   inverse(l_ac),   inverse(l_bc),   turned};
 }
 
 Place place_on(const ExactTriangle& t, Vec3 p) {
@@ -128,27 +119,22 @@ void radix_sort(std::vector<Keyed>& items) {
 }
 
 TriangleRecord make_record(const ExactTriangle& t, float margin) {
-  TriangleRecord r{};
   const Vec3 a{t.a[0], t.a[1], t.a[2]}, b{t.b[0], t.b[1], t.b[2]}, c{t.c[0], t.c[1], t.c[2]};
-  const Vec3 u = normalized(b - a), v = normalized(c - a);
-  const double lu = length(b - a), lv = length(c - a), lw = length(c - b), cosine = dot(u, v);
-  const double sine2 = dot(cross(u, v), cross(u, v));
-  const auto f = [](double x) { return static_cast<float>(x); };
-  r.ax = f(a.x), r.ay = f(a.y), r.az = f(a.z);
-  r.ux = f(u.x), r.uy = f(u.y), r.uz = f(u.z);
-  r.vx = f(v.x), r.vy = f(v.y), r.vz = f(v.z);
-  r.u_length = f(lu), r.v_length = f(lv), r.w_length = f(lw);
-  r.inverse_w = lw > 0 ? f(1 / lw) : 0.0F;
-  r.cosine = f(cosine);
+  const Vec3 ab = b - a, ac = c - a, bc = c - b;
+  const double lu = length(ab), lv = length(ac), lw = length(bc);
+  const double iu = lu * t.inverse_ab, iv = lv * t.inverse_ac, iw = lw * t.inverse_bc;  // 1/length, or 0
+  const Vec3 u = ab * iu, v = ac * iv;
+  const double cosine = dot(u, v);
+  const Vec3 n = cross(u, v);
+  const double sine2 = dot(n, n);
   // Which edge is nearest is decided from squares that rounding blurs by about eps * length^2.
   const double edges = 6e-4 * lw;
   // With the face: the foot of the perpendicular is off by 1/sine^2 times rounding. Without it: by the triangle's height.
-  const double with_face = sine2 > 0 ? static_cast<double>(margin) / sine2 : std::numeric_limits<double>::infinity();
-  const double height = lw > 0 ? lu * lv * std::sqrt(sine2) / lw : 0.0;
-  const bool face = with_face < height && sine2 > 1e-6;
-  r.face = face ? f(1 / sine2) : std::numeric_limits<float>::quiet_NaN();
-  r.slack = f((face ? with_face : height) + edges) * 1.001F;
-  return r;
+  const double inverse_sine2 = 1 / sine2, with_face = margin * inverse_sine2, height = lu * lv * std::sqrt(sine2) * iw;
+  const bool face = sine2 > 1e-6 && with_face < height;
+  const auto f = [](double x) { return static_cast<float>(x); };
+  return {f(a.x), f(a.y), f(a.z), f(u.x), f(u.y), f(u.z), f(v.x), f(v.y), f(v.z), f(lu), f(lv), f(lw), f(iw), f(cosine),
+          face ? f(inverse_sine2) : std::numeric_limits<float>::quiet_NaN(), f((face ? with_face : height) + edges) * 1.001F};
 }
 
 // Into the tree's order: boxes of packs, then boxes of groups, up to one group.
@@ -258,16 +244,12 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   d.view.triangles = static_cast<std::uint32_t>(n);
   // Rounding of coordinates up to 128 and of the sums made of them.
   d.view.margin = 128 * 12 * 6e-8F;
-  d.exact.resize(padded);
-  d.records.resize(padded);
+  d.exact = std::make_unique_for_overwrite<distance::ExactTriangle[]>(padded);
+  d.records = std::make_unique_for_overwrite<distance::TriangleRecord[]>(padded);
   d.original.resize(n);
   d.rank.resize(n);
-  parallel_for(padded, 4096, context.threads, [&](std::size_t begin, std::size_t end) {
+  parallel_for(n, 4096, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (i >= n) {
-        d.exact[i] = d.exact[begin < n ? begin : n - 1];
-        continue;
-      }
       const std::uint32_t t = keys[i].index;
       const auto& v = soup.triangles[t];
       d.original[i] = t;
@@ -280,16 +262,20 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
     d.exact[i] = d.exact[n - 1];
     d.records[i] = d.records[n - 1];
   }
+  for (std::size_t i = 0; i < n; ++i) {
+    const distance::TriangleRecord& r = d.records[i];
+    if (r.face > 0) d.area += 0.5 * static_cast<double>(r.u_length * r.v_length) / std::sqrt(static_cast<double>(r.face));
+  }
   distance::build_boxes(d, context);
-  d.view.records = d.records.data();
-  d.view.exact = d.exact.data();
+  d.view.records = d.records.get();
+  d.view.exact = d.exact.get();
   data_ = std::move(made);
 }
 
 std::size_t TriangleTree::triangle_count() const { return data_ == nullptr ? 0 : data_->view.triangles; }
 
 std::size_t TriangleTree::memory_bytes() const {
-  std::size_t sum = data_->records.size() * sizeof(distance::TriangleRecord) + data_->exact.size() * sizeof(distance::ExactTriangle) +
+  std::size_t sum = (triangle_count() + 15) / 16 * 16 * (sizeof(distance::TriangleRecord) + sizeof(distance::ExactTriangle)) +
                     (data_->original.size() + data_->rank.size()) * 4;
   for (const auto& b : data_->boxes) sum += b.size() * sizeof(distance::BoxGroup);
   return sum;
@@ -315,10 +301,10 @@ ClosestPoint TriangleTree::closest(Vec3 point_mm, std::uint32_t hint, double lim
 ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   // About p, so that far-away coordinates lose nothing more.
   const distance::ExactTriangle t = distance::make_exact(a - p, b - p, c - p);
-  const double zero = 0;
+  const double zero[3] = {0, 0, 0};
   const std::uint32_t id = 0;
   double d2 = 0;
-  distance::kScalar.measure_pairs(&t, &id, &zero, &zero, &zero, 1, &d2);
+  distance::kScalar.measure_voxels(&t, &id, &id, 1, zero, zero, &d2);
   const distance::Place place = distance::place_on(t, Vec3{});
   return {std::sqrt(d2), 0, place.feature, place.point + p};
 }

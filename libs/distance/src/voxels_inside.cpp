@@ -67,6 +67,7 @@ std::vector<Fan> closing_fans(const Ordered& surface, const std::vector<Vec3>& p
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
   };
+  if (surface.open.empty()) return {};
   for (const OpenEdge& e : surface.open) parent[std::max(root(e.from), root(e.to))] = std::min(root(e.from), root(e.to));
   std::vector<Vec3> sum(points.size());
   std::vector<int> count(points.size(), 0);
@@ -265,18 +266,22 @@ VoxelBits VoxelBits::dilated() const {
 VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Context& context, InsideReport* report) {
   require_sound(soup);
   if (static_cast<double>(frame.dims[1]) * frame.dims[2] > 4e9) throw Error(ExitCode::resources, "the grid has more than 4e9 rows");
-  const Ordered surface = ordered(soup, context);
+  // A closed surface needs no order made: its winding number is whole as it is.
+  const bool closed = is_closed(soup);
+  Ordered mended;
+  if (!closed) mended = ordered(soup, context);
+  const TriangleSoup& used = closed ? soup : mended.soup;
   context.progress(0.3, "telling inside from outside");
-  std::vector<Vec3> points(surface.soup.points_mm.size());
+  std::vector<Vec3> points(used.points_mm.size());
   const Mat3 back = inverse(frame.direction);
   parallel_for(points.size(), 8192, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 v = back * (surface.soup.points_mm[i] - frame.origin_mm);
+      const Vec3 v = back * (used.points_mm[i] - frame.origin_mm);
       points[i] = {v.x / frame.spacing_mm.x, v.y / frame.spacing_mm.y, v.z / frame.spacing_mm.z};
     }
   });
-  const std::vector<Fan> fans = closing_fans(surface, points);
-  const RowCrossings rows = scan(surface.soup, points, fans, frame.dims, context);
+  const std::vector<Fan> fans = closing_fans(mended, points);
+  const RowCrossings rows = scan(used, points, fans, frame.dims, context);
   context.progress(0.6);
   VoxelBits bits(frame);
   const std::size_t row_count = rows.first.size() - 1;
@@ -337,7 +342,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
     for (const auto d : decided_in) decided += d;
   }
   if (report != nullptr) {
-    *report = {fans.empty(), surface.open.size(), decided, surface.degenerate, surface.duplicates, surface.flipped};
+    *report = {fans.empty(), mended.open.size(), decided, mended.degenerate, mended.duplicates, mended.flipped};
   }
   context.progress(1.0);
   return bits;

@@ -178,6 +178,22 @@ std::uint64_t orient(TriangleSoup& soup, const std::vector<HalfEdge>& edges) {
 
 }  // namespace
 
+bool is_closed(const TriangleSoup& soup) {
+  // The sum over all edges of a random number for the edge, negative when used backwards. SplitMix64's mixing.
+  std::uint64_t sum = 0;
+  for (const auto& t : soup.triangles) {
+    for (std::size_t e = 0; e < 3; ++e) {
+      const std::uint32_t u = t[e], v = t[e == 2 ? 0 : e + 1];
+      std::uint64_t h = (static_cast<std::uint64_t>(std::min(u, v)) << 32 | std::max(u, v)) + 0x9e3779b97f4a7c15ULL;
+      h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9ULL;
+      h = (h ^ h >> 27) * 0x94d049bb133111ebULL;
+      h ^= h >> 31;
+      sum += u < v ? h : u == v ? 0 : 0 - h;
+    }
+  }
+  return sum == 0;
+}
+
 Ordered ordered(const TriangleSoup& input, const Context& context) {
   Ordered result;
   const std::vector<std::uint32_t> first = representatives(input.points_mm, result.welded_points);

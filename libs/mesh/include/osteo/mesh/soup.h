@@ -28,6 +28,10 @@ struct OpenEdge {
   int count = 1;
 };
 
+/// Every edge is used as often one way as the other, by index (equal points with two indices count as two). O(triangles):
+/// compares fingerprints of 64 bits, so a surface that is not closed passes with probability 2^-64.
+[[nodiscard]] bool is_closed(const TriangleSoup& soup);
+
 /// The same surface with its topology made as good as it can be without moving a point.
 struct Ordered {
   TriangleSoup soup;
