@@ -298,6 +298,10 @@ DistanceMap DistanceMapper::map(const VoxelBits& wanted, const Context& context)
   return run(&wanted, kEverything, kEverything, context);
 }
 
+DistanceMap DistanceMapper::map(const VoxelBits& wanted, double reach_mm, const Context& context) const {
+  return run(&wanted, reach_mm, reach_mm, context);
+}
+
 DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, double outside_mm, const Context& context) const {
   const TriangleTree::Data& tree = tree_.data();
   const auto& dims = frame_.dims;

@@ -6,60 +6,10 @@
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
 #include "osteo/distance/voxelize.h"
+#include "winding.h"
 
 namespace osteo {
-namespace {
 
-// Where the surface crosses a row of voxels: voxels from `first` on have `delta` more winding.
-struct Crossing {
-  std::uint32_t row;
-  std::int32_t first;
-  std::int32_t delta;
-};
-
-// Scan conversion in index coordinates. Which rows an edge passes is a property of the edge alone, so that triangles that share
-// it never leave a gap nor overlap, whatever the rounding.
-void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, const std::array<int, 3>& dims, std::vector<Crossing>& out) {
-  const double lowest = std::min({a.z, b.z, c.z}), highest = std::max({a.z, b.z, c.z});
-  if (highest < 0 || lowest >= dims[2]) return;
-  const int k0 = lowest < 0 ? 0 : static_cast<int>(std::floor(lowest)) + 1;
-  const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(std::floor(highest));
-  const Vec3* corner[3] = {&a, &b, &c};
-  for (int k = k0; k <= k1; ++k) {
-    double y[2] = {0, 0}, x[2] = {0, 0};  // [0]: the edge that goes up, [1]: down
-    for (int e = 0; e < 3; ++e) {
-      const Vec3 *p = corner[e], *q = corner[(e + 1) % 3];
-      const bool p_below = p->z < k, q_below = q->z < k;
-      if (p_below == q_below) continue;
-      const Vec3 &low = p_below ? *p : *q, &high = p_below ? *q : *p;
-      const double t = (k - low.z) / (high.z - low.z);
-      const int which = p_below ? 0 : 1;
-      y[which] = low.y + t * (high.y - low.y);
-      x[which] = low.x + t * (high.x - low.x);
-    }
-    // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray leaves.
-    const bool leaves = y[0] > y[1];
-    const double y0 = leaves ? y[1] : y[0], y1 = leaves ? y[0] : y[1];
-    if (!(y1 >= 0) || y0 > dims[1] - 1) continue;
-    const double x0 = leaves ? x[1] : x[0], x1 = leaves ? x[0] : x[1];
-    const int j0 = y0 <= 0 ? 0 : static_cast<int>(std::ceil(y0));
-    const int j1 = y1 > dims[1] - 1 ? dims[1] : static_cast<int>(std::ceil(y1));
-    const double slope = y1 > y0 ? (x1 - x0) / (y1 - y0) : 0;
-    for (int j = j0; j < j1; ++j) {
-      const double at = std::clamp(x0 + (j - y0) * slope, std::min(x0, x1), std::max(x0, x1));
-      if (at > dims[0] - 1) continue;
-      out.push_back({static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(dims[1]) + static_cast<std::uint32_t>(j),
-                     at <= 0 ? 0 : static_cast<std::int32_t>(std::ceil(at)), leaves ? -weight : weight});
-    }
-  }
-}
-
-struct Fan {
-  Vec3 a, b, c;  // index coordinates
-  int weight;
-};
-
-// Triangles that close the surface, one fan for each connected set of open edges.
 std::vector<Fan> closing_fans(const Ordered& surface, const std::vector<Vec3>& points) {
   std::vector<std::uint32_t> parent(points.size());
   for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -93,14 +43,38 @@ std::vector<Fan> closing_fans(const Ordered& surface, const std::vector<Vec3>& p
   return fans;
 }
 
-// Solid angle of a triangle seen from p. A. van Oosterom and J. Strackee, IEEE Trans. Biomed. Eng. 1983.
-double solid_angle(Vec3 a, Vec3 b, Vec3 c, Vec3 p) {
-  a = a - p, b = b - p, c = c - p;
-  const double la = length(a), lb = length(b), lc = length(c);
-  const double det = dot(a, cross(b, c));
-  const double along = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-  if (det == 0 && along == 0) return 0;
-  return 2 * std::atan2(det, along);
+namespace {
+
+// Where the surface crosses a row of voxels: voxels from `first` on have `delta` more winding.
+struct Crossing {
+  std::uint32_t row;
+  std::int32_t first;
+  std::int32_t delta;
+};
+
+// Scan conversion in index coordinates.
+void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, const std::array<int, 3>& dims, std::vector<Crossing>& out) {
+  const double lowest = std::min({a.z, b.z, c.z}), highest = std::max({a.z, b.z, c.z});
+  if (highest < 0 || lowest >= dims[2]) return;
+  const int k0 = lowest < 0 ? 0 : static_cast<int>(std::floor(lowest)) + 1;
+  const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(std::floor(highest));
+  for (int k = k0; k <= k1; ++k) {
+    const Cut s = cut(a, b, c, k);
+    // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray leaves.
+    const bool leaves = s.y[0] > s.y[1];
+    const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];
+    if (!(y1 >= 0) || y0 > dims[1] - 1) continue;
+    const double x0 = leaves ? s.x[1] : s.x[0], x1 = leaves ? s.x[0] : s.x[1];
+    const int j0 = y0 <= 0 ? 0 : static_cast<int>(std::ceil(y0));
+    const int j1 = y1 > dims[1] - 1 ? dims[1] : static_cast<int>(std::ceil(y1));
+    const double slope = y1 > y0 ? (x1 - x0) / (y1 - y0) : 0;
+    for (int j = j0; j < j1; ++j) {
+      const double at = std::clamp(x0 + (j - y0) * slope, std::min(x0, x1), std::max(x0, x1));
+      if (at > dims[0] - 1) continue;
+      out.push_back({static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(dims[1]) + static_cast<std::uint32_t>(j),
+                     at <= 0 ? 0 : static_cast<std::int32_t>(std::ceil(at)), leaves ? -weight : weight});
+    }
+  }
 }
 
 // Voxels near the openings, whose sign the fans' solid angle may decide. Solid angles in turns: share of the full sphere.

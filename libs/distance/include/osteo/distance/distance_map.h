@@ -9,6 +9,7 @@
 #include "osteo/base/context.h"
 #include "osteo/data/frame.h"
 #include "osteo/data/sparse_grid.h"
+#include "osteo/distance/fan.h"
 #include "osteo/distance/triangle_tree.h"
 #include "osteo/distance/voxelize.h"
 #include "osteo/grid/brick_grid.h"
@@ -57,6 +58,8 @@ class DistanceMapper {
   [[nodiscard]] DistanceMap map(const DistanceMapOptions& options, const Context& context = {}) const;
   /// Of a set of voxels in the same frame.
   [[nodiscard]] DistanceMap map(const VoxelBits& wanted, const Context& context = {}) const;
+  /// Of those of a set that are within `reach_mm`.
+  [[nodiscard]] DistanceMap map(const VoxelBits& wanted, double reach_mm, const Context& context) const;
   [[nodiscard]] const VoxelBits& inside() const { return inside_; }
   [[nodiscard]] const InsideReport& inside_report() const { return report_; }
   [[nodiscard]] const TriangleTree& tree() const { return tree_; }
@@ -69,8 +72,7 @@ class DistanceMapper {
   InsideReport report_;
 };
 
-/// Signed distance and closest point at given points. The sign: where the surface is closed, from the winding number along a
-/// ray; where it is open, from the generalized winding number.
+/// Signed distance and closest point at given points. The sign as voxels_inside tells it.
 class SignedDistance {
  public:
   explicit SignedDistance(const TriangleSoup& soup, const Context& context = {});
@@ -78,15 +80,17 @@ class SignedDistance {
     ClosestPoint closest;
     double signed_mm = 0;  ///< negative inside
   };
+  /// O(log n + openings). Any number of threads may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
-  [[nodiscard]] bool by_normals() const { return by_normals_; }
+  /// Without the distance.
+  [[nodiscard]] bool inside(Vec3 point_mm) const;
+  [[nodiscard]] bool closed() const { return closed_; }
 
  private:
-  TriangleTree tree_;
-  Ordered surface_;
-  std::vector<std::uint32_t> place_;  // soup triangle -> triangle of surface_, or the kept duplicate's
-  std::vector<Vec3> face_normal_, corner_normal_, edge_normal_;
-  bool by_normals_ = false;
+  TriangleTree tree_, ray_tree_;
+  TriangleSoup surface_;  // what the rays meet: in order, when it was not closed
+  std::vector<Fan> fans_;
+  bool closed_ = true;
 };
 
 /// "distance_mm", for .vdb files; what is not stored has the background value (the largest stored distance outside).
