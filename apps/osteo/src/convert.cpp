@@ -24,7 +24,7 @@ cli::CommandInfo ConvertCommand::info() {
 
 int ConvertCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path from = io.arguments[0], to = io.arguments[1];
-  static constexpr std::array kAny{DataKind::labels, DataKind::image, DataKind::grid, DataKind::surface, DataKind::picture};
+  static constexpr std::array kAny{DataKind::labels, DataKind::image, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture};
   require_readable(from);
   if (fs::exists(to) && !io.common.force) {
     throw Error(ExitCode::cannot_write, "'" + to.string() + "' exists already", "give another name, or --force to replace it");

@@ -10,6 +10,7 @@
 #include "osteo/dicom/scan.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/pipeline/formats.h"
+#include "osteo/tets/quality.h"
 
 namespace osteo {
 namespace {
@@ -68,6 +69,16 @@ ordered_json describe_data(const Data& data) {
       }
     }
     j["bounds_mm"] = {triple(lo), triple(hi)};
+  } else if (const auto* tets = std::get_if<Tets>(&data)) {
+    const TetQuality q = tet_quality(**tets);
+    j["points"] = q.points;
+    j["tets"] = q.tets;
+    j["volume_mm3"] = q.volume_mm3;
+    j["inverted"] = q.inverted;
+    j["conforming"] = q.conforming();
+    j["min_dihedral_deg"] = q.min_dihedral_deg;
+    j["max_dihedral_deg"] = q.max_dihedral_deg;
+    j["min_aspect"] = q.min_aspect;
   } else if (const auto* picture = std::get_if<Picture>(&data)) {
     j["width"] = picture->width;
     j["height"] = picture->height;
@@ -132,7 +143,7 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
     if (j.is_discarded())
       throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
   } else {
-    static constexpr std::array kAny{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::picture};
+    static constexpr std::array kAny{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture};
     j["file"] = path.string();
     j.update(describe_data(load_data(path, kAny, io.context)));
   }

@@ -1,5 +1,7 @@
 #include "commands.h"
 #include "osteo/dicom/import.h"
+#include "osteo/distance/compare.h"
+#include "osteo/distance/stages.h"
 #include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/crop.h"
@@ -7,6 +9,7 @@
 #include "osteo/image/structures.h"
 #include "osteo/image/threshold.h"
 #include "osteo/mesh/bone_surface.h"
+#include "osteo/meshing/stages.h"
 #include "osteo/view/snapshot.h"
 
 namespace osteo {
@@ -16,15 +19,27 @@ cli::Program make_osteo_program() {
   p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
   p.licence =
       "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB and zlib (all "
-      "permissive or MPL-2.0);\n"
-      "it contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n"
-      "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
+      "permissive or MPL-2.0)";
+  if (const std::string parts(copyleft_parts()); !parts.empty()) {
+    p.licence += ",\nand " + parts + ", so that as a whole it falls under the " + (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
+                 "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF for one that does not.\n";
+  } else {
+    p.licence += ";\nit contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n";
+  }
+  p.licence += "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
   p.registry.add<ImportStage>();
   p.registry.add<ImportBoneStage>();
   p.registry.add<CropStage>();
   p.registry.add<ThresholdStage>();
   p.registry.add<ResampleStage>();
   p.registry.add<SurfaceStage>();
+  p.registry.add<MeshInfoStage>();
+  p.registry.add<MeshRepairStage>();
+  p.registry.add<CompareStage>();
+  p.registry.add<DistanceStage>();
+  p.registry.add<DistanceAtStage>();
+  p.registry.add<VoxelizeStage>();
+  p.registry.add<TetrahedralizeStage>();
   p.registry.add<SnapshotStage>();
   p.registry.add<StructuresStage>();
   p.registry.add<PhantomStage>();

@@ -9,6 +9,7 @@
 #include "osteo/dicom/save_series.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
+#include "osteo/io/tet_io.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/stage/stage.h"
 
@@ -19,12 +20,13 @@ struct Suffixes {
   DataKind kind;
   std::string_view writable;
 };
-constexpr std::array<Suffixes, 6> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
+constexpr std::array<Suffixes, 7> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
                                              {DataKind::labels, ".seg.nrrd .nrrd .nii .nii.gz .mha .vti .dcm"},
                                              {DataKind::grid, ".vdb"},
                                              {DataKind::surface, ".ply .stl .obj .glb .3mf .vtp .dcm"},
                                              {DataKind::picture, ".png"},
-                                             {DataKind::document, ".json"}}};
+                                             {DataKind::document, ".json"},
+                                             {DataKind::tets, ".vtu .node .ele"}}};
 
 bool accepts(std::span<const DataKind> kinds, DataKind kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
@@ -56,6 +58,10 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   if (is_surface_file(path)) {
     if (!accepts(accepted, DataKind::surface)) throw wrong(DataKind::surface);
     return load_surface(path);
+  }
+  if (is_tet_file(path)) {
+    if (!accepts(accepted, DataKind::tets)) throw wrong(DataKind::tets);
+    return load_tets(path);
   }
   if (path.extension() == ".png") {
     if (!accepts(accepted, DataKind::picture)) throw wrong(DataKind::picture);
@@ -125,6 +131,9 @@ void save_data(const Data& data, const fs::path& path, const Context& context) {
       return;
     case DataKind::document:
       write_file(path, std::get<Document>(data).json);
+      return;
+    case DataKind::tets:
+      save_tets(*std::get<Tets>(data), path);
       return;
     case DataKind::none:
     case DataKind::source:

@@ -9,6 +9,7 @@
 #include <vtkObjectFactory.h>
 #include <vtkPolyData.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkUnstructuredGrid.h>
 
 #include <algorithm>
 #include <atomic>
@@ -31,6 +32,7 @@ bool is_image(DataKind kind) {
 const char* class_of(DataKind kind) {
   if (is_image(kind)) return "vtkImageData";
   if (kind == DataKind::surface) return "vtkPolyData";
+  if (kind == DataKind::tets) return "vtkUnstructuredGrid";
   return "vtkOsteoDataObject";
 }
 
@@ -55,6 +57,9 @@ osteo::Data from_vtk(vtkDataObject* object, const osteo::Port& port) {
     }
     if (auto* const poly = vtkPolyData::SafeDownCast(object); poly != nullptr && kind == DataKind::surface) {
       return std::make_shared<const osteo::TriMesh>(osteo::mesh_from_vtk(poly));
+    }
+    if (auto* const cells = vtkUnstructuredGrid::SafeDownCast(object); cells != nullptr && kind == DataKind::tets) {
+      return std::make_shared<const osteo::TetMesh>(osteo::tets_from_vtk(cells));
     }
   }
   throw osteo::Error(osteo::ExitCode::usage, "the input '" + port.name + "' cannot be a " + object->GetClassName());
@@ -299,6 +304,8 @@ bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector*
       image->SetExtent(promised);
     } else if (auto* const poly = vtkPolyData::SafeDownCast(object)) {
       if (const auto* s = std::get_if<osteo::Surface>(&value)) poly->ShallowCopy(osteo::to_vtk(**s));
+    } else if (auto* const cells = vtkUnstructuredGrid::SafeDownCast(object)) {
+      if (const auto* t = std::get_if<osteo::Tets>(&value)) cells->ShallowCopy(osteo::to_vtk(**t));
     } else if (auto* const own = vtkOsteoDataObject::SafeDownCast(object)) {
       own->SetValue(value);
     }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "osteo/data/sparse_grid.h"
+#include "osteo/data/tet_mesh.h"
 #include "osteo/data/tri_mesh.h"
 #include "osteo/data/volume.h"
 
@@ -31,16 +32,16 @@ struct Document {
 };
 
 /// std::monostate stands for an optional input that was not given.
-using Data = std::variant<std::monostate, Source, Image, Labels, SparseGrid, Surface, Picture, Document>;
+using Data = std::variant<std::monostate, Source, Image, Labels, SparseGrid, Surface, Picture, Document, Tets>;
 
 /// In the order of the alternatives of Data.
-enum class DataKind : int { none, source, image, labels, grid, surface, picture, document };
+enum class DataKind : int { none, source, image, labels, grid, surface, picture, document, tets };
 
 [[nodiscard]] inline DataKind kind_of(const Data& data) {
   return static_cast<DataKind>(data.index());
 }
 [[nodiscard]] constexpr std::string_view kind_name(DataKind kind) {
-  constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture", "document"};
+  constexpr std::string_view names[] = {"none", "source", "image", "labels", "grid", "surface", "picture", "document", "tets"};
   return names[static_cast<int>(kind)];
 }
 

@@ -82,7 +82,7 @@ class SignedDistance {
   };
   /// O(log n + openings). Any number of threads may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
-  /// Without the distance.
+  [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const { return tree_.closest(point_mm, hint); }
   [[nodiscard]] bool inside(Vec3 point_mm) const;
   [[nodiscard]] bool closed() const { return closed_; }
 

@@ -5,11 +5,13 @@
 #include <filesystem>
 
 #include "osteo/base/error.h"
+#include "osteo/data/tet_mesh.h"
 #include "osteo/data/tri_mesh.h"
 #include "osteo/data/volume.h"
 
 class vtkImageData;
 class vtkPolyData;
+class vtkUnstructuredGrid;
 
 namespace osteo {
 
@@ -19,12 +21,16 @@ namespace osteo {
 /// Copies points and triangles.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> to_vtk(const TriMesh& mesh);
 
+[[nodiscard]] vtkSmartPointer<vtkUnstructuredGrid> to_vtk(const TetMesh& mesh);
+
 /// Zero-copy where the scalars are already of the right type, else converted as load_image / load_labels do.
 /// Errors: corrupt when there are no scalars, several components, or values that do not fit.
 [[nodiscard]] Image image_from_vtk(vtkImageData* data);
 [[nodiscard]] Labels labels_from_vtk(vtkImageData* data);
 /// Polygons of more than three points are refused (Error corrupt); strips and lines are ignored.
 [[nodiscard]] TriMesh mesh_from_vtk(vtkPolyData* data);
+/// Cells must be tetrahedra (Error corrupt); those of negative volume are turned round.
+[[nodiscard]] TetMesh tets_from_vtk(vtkUnstructuredGrid* data);
 
 /// What to throw when a VTK writer failed: says "no space left" when that was it.
 [[nodiscard]] Error vtk_write_error(const std::filesystem::path& path, unsigned long vtk_error_code);

@@ -1,0 +1,34 @@
+// What CGAL does for us. CGAL's meshing and mesh processing packages are GPL: a binary with this library falls under the GPL.
+#pragma once
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "osteo/base/context.h"
+#include "osteo/data/tet_mesh.h"
+#include "osteo/mesh/soup.h"
+
+namespace osteo {
+
+/// Pairs of triangles that intersect otherwise than in a shared edge or point, by exact predicates; ascending.
+[[nodiscard]] std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const TriangleSoup& surface, const Context& context = {});
+
+struct CgalRepairReport {
+  std::uint64_t holes_filled = 0, holes_left = 0;
+  std::uint64_t self_intersections_before = 0, self_intersections_after = 0;
+};
+/// Makes a manifold, closes holes of at most `max_hole_edges` edges (0: none), takes out self-intersections by cutting and filling
+/// again where that works. Errors: failed when no surface is left.
+[[nodiscard]] TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, bool remove_self_intersections,
+                                            CgalRepairReport& report, const Context& context = {});
+
+struct CgalMeshOptions {
+  double cell_mm = 2;            ///< longest circumradius of a tetrahedron
+  double facet_distance_mm = 0;  ///< farthest the boundary may be from the surface; 0: a tenth of cell_mm
+  double surface_cell_mm = 0;    ///< the same as cell_mm at the surface, from where it grows inward; 0: no grading
+  bool optimise = true;          ///< perturb and exude, against slivers
+};
+/// Delaunay refinement (CGAL Mesh_3) of a closed surface without self-intersections. Errors: failed otherwise, naming what is wrong.
+[[nodiscard]] TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options, const Context& context = {});
+
+}  // namespace osteo

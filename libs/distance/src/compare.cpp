@@ -1,0 +1,182 @@
+#include "osteo/distance/compare.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <queue>
+
+#include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
+#include "osteo/distance/triangle_tree.h"
+#include "osteo/mesh/bone_surface.h"
+
+namespace osteo {
+namespace {
+
+struct Piece {
+  Vec3 a, b, c;
+  double upper;  // no point of it is farther than this
+  std::uint64_t order;  // ties
+  friend bool operator<(const Piece& x, const Piece& y) { return x.upper != y.upper ? x.upper < y.upper : x.order > y.order; }
+};
+
+OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double extent, const Context& context) {
+  OneWayDistance result;
+  const std::size_t n = from.triangles.size();
+  std::vector<double> area(n);
+  double total = 0;
+  const auto corner = [&](std::size_t t, std::size_t i) { return from.points_mm[from.triangles[t][i]]; };
+  for (std::size_t t = 0; t < n; ++t) {
+    area[t] = length(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))) / 2;
+    total += area[t];
+  }
+  // About 200,000 samples, at least one a triangle, each standing for its share of the triangle's area.
+  std::vector<std::uint32_t> count(n);
+  std::vector<std::size_t> first(n + 1, 0);
+  for (std::size_t t = 0; t < n; ++t) {
+    count[t] = 1 + (total > 0 ? static_cast<std::uint32_t>(std::min(1e6, area[t] / total * 200000)) : 0);
+    first[t + 1] = first[t] + count[t];
+  }
+  std::vector<std::pair<double, double>> samples(first[n]);  // distance, weight
+  std::vector<Piece> pieces(n);
+  parallel_for(n, 512, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    std::uint32_t hint = ClosestPoint::kNone;
+    for (std::size_t t = begin; t < end; ++t) {
+      const Vec3 a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
+      for (std::uint32_t s = 0; s < count[t]; ++s) {
+        // A low-discrepancy sequence (R2: the plastic number), folded into the triangle.
+        double u = std::fmod(0.5 + 0.7548776662466927 * s, 1.0), v = std::fmod(0.5 + 0.5698402909980532 * s, 1.0);
+        if (count[t] == 1) u = v = 1.0 / 3;
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        const ClosestPoint p = to.closest(a + (b - a) * u + (c - a) * v, hint);
+        hint = p.triangle;
+        samples[first[t] + s] = {p.distance_mm, area[t] / count[t]};
+      }
+      const Vec3 m = (a + b + c) / 3;
+      const ClosestPoint p = to.closest(m, hint);
+      const double reach = std::max({length(a - m), length(b - m), length(c - m)});
+      pieces[t] = {a, b, c, p.distance_mm + reach, t};
+    }
+  });
+  double sum = 0, squares = 0, weight = 0;
+  for (const auto& [d, w] : samples) {
+    sum += d * w;
+    squares += d * d * w;
+    weight += w;
+  }
+  result.samples = samples.size();
+  if (weight > 0) {
+    result.mean_mm = sum / weight;
+    result.rms_mm = std::sqrt(squares / weight);
+  }
+  std::sort(samples.begin(), samples.end());
+  double passed = 0;
+  for (const auto& [d, w] : samples) {
+    passed += w;
+    result.p95_mm = d;
+    if (passed >= 0.95 * weight) break;
+  }
+  result.max_mm = -1;
+  const auto offer = [&](Vec3 x) {
+    const ClosestPoint p = to.closest(x);
+    if (p.distance_mm > result.max_mm) {
+      result.max_mm = p.distance_mm;
+      result.worst_mm = x;
+    }
+    return p.distance_mm;
+  };
+  const double tolerance = 1e-4 * extent;
+  std::priority_queue<Piece> queue(std::less<Piece>(), std::move(pieces));
+  std::uint64_t questions = 0, order = n;
+  while (!queue.empty() && queue.top().upper > result.max_mm + tolerance && questions < 200000) {
+    if ((questions & 1023U) == 0) context.check_cancelled();
+    const Piece q = queue.top();
+    queue.pop();
+    // Corners first: an extreme is usually there. Then four triangles.
+    for (const Vec3 x : {q.a, q.b, q.c}) offer(x);
+    const Vec3 ab = (q.a + q.b) * 0.5, bc = (q.b + q.c) * 0.5, ca = (q.c + q.a) * 0.5;
+    const std::array<std::array<Vec3, 3>, 4> parts{{{q.a, ab, ca}, {ab, q.b, bc}, {ca, bc, q.c}, {ab, bc, ca}}};
+    for (const auto& part : parts) {
+      const Vec3 m = (part[0] + part[1] + part[2]) / 3;
+      const double d = offer(m);
+      const double upper = std::min(q.upper, d + std::max({length(part[0] - m), length(part[1] - m), length(part[2] - m)}));
+      if (upper > result.max_mm + tolerance) queue.push({part[0], part[1], part[2], upper, order++});
+    }
+    questions += 7;
+  }
+  if (result.max_mm < 0) offer(corner(0, 0));
+  result.max_bound_mm = std::max(result.max_mm + tolerance, queue.empty() ? 0.0 : queue.top().upper);
+  return result;
+}
+
+TriangleSoup soup_from(const Data& data, double iso, const Context& context) {
+  if (const auto* surface = std::get_if<Surface>(&data)) return soup_of(**surface);
+  if (const auto* tets = std::get_if<Tets>(&data)) return soup_of(boundary_of(**tets));
+  return soup_of(surface_nets(to_bricks(std::get<SparseGrid>(data)), static_cast<float>(iso), context).mesh);
+}
+
+}  // namespace
+
+SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b, const Context& context) {
+  const TriangleTree tree_a(a, context), tree_b(b, context);
+  Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+  for (const TriangleSoup* s : {&a, &b}) {
+    for (const auto& t : s->triangles) {
+      for (const auto v : t) {
+        for (std::size_t x = 0; x < 3; ++x) {
+          lo[x] = std::min(lo[x], s->points_mm[v][x]);
+          hi[x] = std::max(hi[x], s->points_mm[v][x]);
+        }
+      }
+    }
+  }
+  const double extent = length(hi - lo);
+  SurfaceComparison result;
+  context.progress(0.1, "comparing");
+  result.a_to_b = one_way(a, tree_b, extent, context);
+  context.progress(0.55);
+  result.b_to_a = one_way(b, tree_a, extent, context);
+  context.progress(1.0);
+  return result;
+}
+
+StageInfo CompareStage::info() {
+  return {.name = "compare",
+          .version = 1,
+          .synopsis = "how far apart two surfaces, grids or tetrahedral meshes are",
+          .description = "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum (Hausdorff) "
+                         "with a bound that it cannot exceed. Enclosed volumes. A grid stands for its isosurface, tetrahedra for their boundary.",
+          .inputs = {{"a", {DataKind::surface, DataKind::tets, DataKind::grid}, "one surface"},
+                     {"b", {DataKind::surface, DataKind::tets, DataKind::grid}, "the other"}},
+          .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},
+          .references = {"P. Cignoni et al., Metro: measuring error on simplified surfaces, Computer Graphics Forum 1998"},
+          .example = "osteo compare bone.ply repaired.ply difference.json"};
+}
+
+std::vector<Data> CompareStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
+  const TriangleSoup a = soup_from(inputs[0], params.iso, context), b = soup_from(inputs[1], params.iso, context);
+  const SurfaceComparison c = compare_surfaces(a, b, context);
+  nlohmann::ordered_json j;
+  const auto put = [&](const std::string& key, double value) {
+    j[key] = value;
+    context.report(key, value);
+  };
+  put("hausdorff_mm", c.hausdorff_mm());
+  put("hausdorff_bound_mm", c.hausdorff_bound_mm());
+  for (const auto& [name, d] : {std::pair{"a_to_b", &c.a_to_b}, std::pair{"b_to_a", &c.b_to_a}}) {
+    const std::string p = std::string(name) + "_";
+    put(p + "mean_mm", d->mean_mm);
+    put(p + "rms_mm", d->rms_mm);
+    put(p + "p95_mm", d->p95_mm);
+    put(p + "max_mm", d->max_mm);
+    j[p + "worst_point_mm"] = {d->worst_mm.x, d->worst_mm.y, d->worst_mm.z};
+    j[p + "samples"] = d->samples;
+  }
+  for (const auto& [name, s] : {std::pair{"a", &a}, std::pair{"b", &b}}) {
+    if (is_closed(ordered(*s).soup)) put(std::string(name) + "_volume_mm3", enclosed_volume_mm3(mesh_of(*s)));
+  }
+  return {Document{j.dump(2) + "\n"}};
+}
+
+}  // namespace osteo
