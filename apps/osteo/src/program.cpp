@@ -4,12 +4,14 @@
 #include "osteo/distance/stages.h"
 #include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
+#include "osteo/haptics/curve_stage.h"
 #include "osteo/image/crop.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/structures.h"
 #include "osteo/image/threshold.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/meshing/stages.h"
+#include "osteo/tets/skin.h"
 #include "osteo/view/snapshot.h"
 
 namespace osteo {
@@ -40,6 +42,8 @@ cli::Program make_osteo_program() {
   p.registry.add<DistanceAtStage>();
   p.registry.add<VoxelizeStage>();
   p.registry.add<TetrahedralizeStage>();
+  p.registry.add<SkinStage>();
+  p.registry.add<CurveStage>();
   p.registry.add<SnapshotStage>();
   p.registry.add<StructuresStage>();
   p.registry.add<PhantomStage>();

@@ -75,7 +75,8 @@ class BlockMapper {
     const Vec3 g = normalized(centre - place);
     const distance::Pivot pivot{static_cast<float>(std::sqrt(nearest.d2)), {static_cast<float>(g.x), static_cast<float>(g.y), static_cast<float>(g.z)}};
     const float cf[3] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
-    if (s_.packs.empty()) s_.packs.resize(tree_.view.triangles / 16 + 32);
+    // The scratch outlives a map: another tree may have more packs.
+    if (s_.packs.size() < tree_.view.triangles / 16 + 32) s_.packs.resize(tree_.view.triangles / 16 + 32);
     const int packs = kernel_.collect(tree_.view, cf, half, pivot, s_.packs.data());
     s_.ids.resize(static_cast<std::size_t>(packs) * 16);
     std::size_t count = 0;
@@ -275,7 +276,11 @@ std::int64_t DistanceMap::find(int i, int j, int k) const {
 }
 
 DistanceMapper::DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context) : frame_(frame) {
-  require_valid(frame);
+  for (std::size_t a = 0; a < 3; ++a) {  // any scale will do here, other than in scans of patients
+    if (frame.dims[a] < 1 || !(frame.spacing_mm[a] > 0) || !std::isfinite(frame.spacing_mm[a])) {
+      throw Error(ExitCode::usage, "the grid needs at least one voxel and a positive spacing along each axis");
+    }
+  }
   tree_ = TriangleTree(soup, frame.direction, context.sub(0, 0.5));
   inside_ = voxels_inside(soup, frame, context.sub(0.5, 1), &report_);
 }
@@ -293,12 +298,7 @@ DistanceMap DistanceMapper::map(const DistanceMapOptions& options, const Context
   return run(nullptr, options.band_inside_mm, options.band_outside_mm, context);
 }
 
-DistanceMap DistanceMapper::map(const VoxelBits& wanted, const Context& context) const {
-  constexpr double kEverything = std::numeric_limits<double>::infinity();
-  return run(&wanted, kEverything, kEverything, context);
-}
-
-DistanceMap DistanceMapper::map(const VoxelBits& wanted, double reach_mm, const Context& context) const {
+DistanceMap DistanceMapper::map_of(const VoxelBits& wanted, double reach_mm, const Context& context) const {
   return run(&wanted, reach_mm, reach_mm, context);
 }
 

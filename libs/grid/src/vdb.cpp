@@ -70,11 +70,12 @@ Frame frame_of(const openvdb::FloatGrid& grid) {
 
 }  // namespace
 
-BrickGrid to_bricks(const SparseGrid& sparse) {
+BrickGrid to_bricks(const SparseGrid& sparse, bool all) {
   openvdb::FloatTree tree(sparse.impl->grid->tree());
   tree.voxelizeActiveTiles();
   std::vector<Ijk> bricks;
-  const auto holds_value = [](const auto& leaf) {
+  const auto holds_value = [all](const auto& leaf) {
+    if (all) return leaf.cbeginValueOn().test();
     for (auto v = leaf.cbeginValueOn(); v; ++v) {
       if (*v > 0) return true;
     }

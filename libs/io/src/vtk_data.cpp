@@ -14,6 +14,7 @@
 #include <vtkOutputWindow.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
+#include <vtkPolygon.h>
 #include <vtkShortArray.h>
 #include <vtkUnsignedCharArray.h>
 
@@ -142,9 +143,29 @@ TriMesh mesh_from_vtk(vtkPolyData* data) {
     vtkIdType n = 0;
     const vtkIdType* ids = nullptr;
     it->GetCurrentCell(n, ids);
-    if (n != 3) {
-      throw Error(ExitCode::corrupt, "a polygon has " + std::to_string(n) + " points; only triangles are supported",
-                  "triangulate the surface first");
+    for (vtkIdType k = 0; k < n; ++k) {
+      if (ids[k] < 0 || ids[k] >= data->GetNumberOfPoints()) {
+        throw Error(ExitCode::corrupt, "polygon " + std::to_string(it->GetCurrentCellId()) + " names point " + std::to_string(ids[k]) +
+                                           ", but there are only " + std::to_string(data->GetNumberOfPoints()) + " points");
+      }
+    }
+    if (n < 3) continue;
+    if (n > 3) {
+      // Ears; a polygon so twisted that this fails becomes a fan.
+      vtkNew<vtkPolygon> polygon;
+      polygon->Initialize(static_cast<int>(n), ids, data->GetPoints());
+      vtkNew<vtkIdList> corners;
+      if (polygon->Triangulate(corners) == 0) {
+        corners->Reset();
+        for (vtkIdType k = 1; k + 1 < n; ++k) {
+          for (const vtkIdType c : {vtkIdType{0}, k, k + 1}) corners->InsertNextId(c);
+        }
+      }
+      for (vtkIdType k = 0; k + 2 < corners->GetNumberOfIds(); k += 3) {
+        const auto corner = [&](vtkIdType c) { return static_cast<std::uint32_t>(ids[corners->GetId(k + c)]); };
+        mesh.triangles.push_back({corner(0), corner(1), corner(2)});
+      }
+      continue;
     }
     mesh.triangles.push_back({static_cast<std::uint32_t>(ids[0]), static_cast<std::uint32_t>(ids[1]), static_cast<std::uint32_t>(ids[2])});
   }

@@ -45,7 +45,7 @@ Lattice sample(const TriangleSoup& surface, double spacing_mm, const Context& co
     }
   }
   const double reach = 2.1 * spacing_mm / 2;  // an edge is at most 2 half spacings long
-  const DistanceMap map = mapper.map(wanted, reach, context.sub(0.4, 0.7));
+  const DistanceMap map = mapper.map_of(wanted, reach, context.sub(0.4, 0.7));
   lattice.value.resize(f.voxel_count());
   for (int z = 0; z < f.dims[2]; ++z) {
     for (int y = 0; y < f.dims[1]; ++y) {

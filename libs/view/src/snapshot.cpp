@@ -45,11 +45,27 @@ int sample_label(const Labels& labels, Vec3 world) {
   return labels.at(v[0], v[1], v[2]);
 }
 
+// 1, 2 or 5 times a power of ten, near x.
+double step_of(double x) {
+  const double power = std::pow(10.0, std::floor(std::log10(x)));
+  return power * (x / power < 1.5 ? 1 : x / power < 3.5 ? 2 : x / power < 7.5 ? 5 : 10);
+}
+
 GreyAt grey_of(const Data& data) {
   if (const auto* image = std::get_if<Image>(&data)) return [image](Vec3 p) { return grey_of_hu(hu_at(*image, p)); };
   if (const auto* grid = std::get_if<SparseGrid>(&data)) {
     auto sampler = std::make_shared<GridSampler>(*grid);
     if (grid->name == "hu") return [sampler](Vec3 p) { return grey_of_hu(static_cast<double>(sampler->nearest(p))); };
+    if (grid->name == "distance_mm") {
+      // Lighter with distance, a dark line at each of about ten steps; black where nothing is stored.
+      const double background = grid->background, step = step_of(std::max(background, 1e-9) / 5);
+      return [sampler, background, step](Vec3 p) {
+        const auto d = static_cast<double>(sampler->nearest(p));
+        if (d == static_cast<float>(background)) return 12.0;
+        const double phase = std::abs(d) / step - std::floor(std::abs(d) / step);
+        return (phase < 0.12 ? 60.0 : 120.0) + 110.0 * std::min(1.0, std::abs(d) / std::max(background, 1e-9));
+      };
+    }
     return [sampler](Vec3 p) { return 255.0 * static_cast<double>(std::clamp(sampler->nearest(p), 0.0F, 1.0F)); };
   }
   return nullptr;
@@ -59,6 +75,7 @@ LabelAt label_of(const Data& data) {
   if (const auto* labels = std::get_if<Labels>(&data)) return [labels](Vec3 p) { return sample_label(*labels, p); };
   if (const auto* grid = std::get_if<SparseGrid>(&data)) {
     auto sampler = std::make_shared<GridSampler>(*grid);
+    if (grid->name == "distance_mm") return [sampler](Vec3 p) { return sampler->nearest(p) < 0 ? 1 : 0; };
     return [sampler](Vec3 p) { return sampler->nearest(p) >= 0.5F ? 1 : 0; };
   }
   return nullptr;
@@ -80,6 +97,9 @@ std::pair<Vec3, Vec3> bounds_of(const Data& data) {
   if (const auto* image = std::get_if<Image>(&data)) add_frame(image->frame);
   if (const auto* labels = std::get_if<Labels>(&data)) add_frame(labels->frame);
   if (const auto* grid = std::get_if<SparseGrid>(&data)) return GridSampler::bounds_mm(*grid);
+  if (const auto* tets = std::get_if<Tets>(&data)) {
+    for (const auto& p : (*tets)->points_mm) add({p[0], p[1], p[2]});
+  }
   if (const auto* surface = std::get_if<Surface>(&data)) {
     for (const auto& p : (*surface)->points_mm) add({p[0], p[1], p[2]});
   }
@@ -147,6 +167,42 @@ vtkSmartPointer<vtkActor> structure_actor(const Labels& labels, const Structure&
   return actor;
 }
 
+// The half of a mesh that is farther from the eye, so that its inside shows.
+TriMesh half_of(const TetMesh& mesh, Vec3 eye) {
+  const auto at = [&](std::uint32_t v) { return Vec3{mesh.points_mm[v][0], mesh.points_mm[v][1], mesh.points_mm[v][2]}; };
+  Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+  for (std::uint32_t v = 0; v < mesh.points_mm.size(); ++v) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], at(v)[a]);
+      hi[a] = std::max(hi[a], at(v)[a]);
+    }
+  }
+  // The cut is along the body axis nearest to the direction of the eye.
+  std::size_t axis = 0;
+  for (std::size_t a = 1; a < 3; ++a) {
+    if (std::abs(eye[a]) > std::abs(eye[axis])) axis = a;
+  }
+  const double middle = (lo[axis] + hi[axis]) / 2;
+  TetMesh half;
+  half.points_mm = mesh.points_mm;
+  for (const auto& t : mesh.tets) {
+    const double c = (at(t[0])[axis] + at(t[1])[axis] + at(t[2])[axis] + at(t[3])[axis]) / 4;
+    if ((c - middle) * eye[axis] <= 0) half.tets.push_back(t);
+  }
+  return boundary_of(half);
+}
+
+// The zero level of a map of distances, as bone of density 1/2 at the surface.
+TriMesh zero_of(const SparseGrid& grid, const Context& context) {
+  BrickGrid bricks = to_bricks(grid, true);
+  const double voxel = std::cbrt(grid.frame.voxel_volume_mm3());
+  for (VoxelKey key = 0; key < bricks.brick_count() * BrickGrid::kVoxels; ++key) {
+    const float d = bricks.value(key);
+    bricks.set(key, d == 0 ? 0.0F : static_cast<float>(std::clamp(0.5 - static_cast<double>(d) / voxel / 2, 0.0, 1.0)));
+  }
+  return surface_nets(bricks, 0.5F, context).mesh;
+}
+
 vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
   if (const auto* surface = std::get_if<Surface>(&s.surface)) return to_vtk(**surface);
   // Structures are drawn inside the bone, not instead of it.
@@ -154,6 +210,8 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
   for (const Data* data : {&s.mask, &s.subject}) {
     if (data == &s.mask && !mask_is_bone) continue;
     if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
+    if (const auto* tets = std::get_if<Tets>(data)) return to_vtk(half_of(**tets, eye_direction(p.view)));
+    if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm") return to_vtk(zero_of(*grid, context));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
       return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
     }
@@ -202,7 +260,7 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   Picture picture{p.width, p.height, {}};
   picture.rgb.assign(static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height) * 3, 12);
   const int pw = p.width / 2 - 2, ph = p.height / 2 - 2;
-  const bool flat = !std::holds_alternative<Surface>(s.subject);
+  const bool flat = !std::holds_alternative<Surface>(s.subject) && !std::holds_alternative<Tets>(s.subject);
   const auto [lo, hi] = bounds_of(s.subject);
   const Vec3 centre = (lo + hi) * 0.5, size = hi - lo;
   const bool through_given = p.centre_mm != std::array<double, 3>{};
@@ -212,7 +270,9 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   if (flat) {
     const bool labels_only = std::holds_alternative<Labels>(s.subject);
     const GreyAt grey = labels_only ? nullptr : grey_of(s.subject);
-    const LabelAt label = label_of(labels_only ? s.subject : s.mask);
+    const auto* const grid = std::get_if<SparseGrid>(&s.subject);
+    const bool shows_inside = labels_only || (grid != nullptr && grid->name == "distance_mm");
+    const LabelAt label = label_of(shows_inside ? s.subject : s.mask);
     for (int n = 0; n < 3; ++n) {
       context.progress(0.1 * n, "slices");
       SliceView view;
@@ -240,6 +300,11 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
     set_up_scene(renderer);
     const auto bone = make_bone_actor(surface);
     renderer->AddActor(bone);
+    if (std::holds_alternative<Tets>(s.subject)) {
+      bone->GetProperty()->SetEdgeVisibility(1);
+      bone->GetProperty()->SetEdgeColor(0.25, 0.22, 0.18);
+      bone->GetProperty()->SetInterpolationToFlat();
+    }
     if (!structures.empty() && std::holds_alternative<Labels>(s.mask)) {
       bone->GetProperty()->SetOpacity(0.3);
       for (const Structure& each : structures) renderer->AddActor(structure_actor(std::get<Labels>(s.mask), each));
@@ -264,11 +329,11 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
 StageInfo SnapshotStage::info() {
   return {.name = "snapshot",
           .version = 2,
-          .synopsis = "a picture (PNG) of a CT, mask, bone grid or surface",
+          .synopsis = "a picture (PNG) of a CT, mask, grid, surface or tetrahedra",
           .description =
               "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit view in "
-              "3D. Needs no display.",
-          .inputs = {{"subject", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface}, "what to show"},
+              "3D. Of tetrahedra the half that faces away, with its edges; of a distance grid lines of equal distance. Needs no display.",
+          .inputs = {{"subject", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "what to show"},
                      {"mask", {DataKind::labels, DataKind::grid}, "tinted over the cuts and shown in 3D", true},
                      {"surface", {DataKind::surface}, "shown in 3D", true}},
           .outputs = {{"picture", {DataKind::picture}, "the picture"}},

@@ -55,11 +55,10 @@ class DistanceMapper {
  public:
   /// Builds the tree and tells inside from outside. Errors as of TriangleTree.
   DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context = {});
-  [[nodiscard]] DistanceMap map(const DistanceMapOptions& options, const Context& context = {}) const;
-  /// Of a set of voxels in the same frame.
-  [[nodiscard]] DistanceMap map(const VoxelBits& wanted, const Context& context = {}) const;
-  /// Of those of a set that are within `reach_mm`.
-  [[nodiscard]] DistanceMap map(const VoxelBits& wanted, double reach_mm, const Context& context) const;
+  [[nodiscard]] DistanceMap map(const DistanceMapOptions& options = {}, const Context& context = {}) const;
+  /// Of those voxels of a set in the same frame that are within `reach_mm`.
+  [[nodiscard]] DistanceMap map_of(const VoxelBits& wanted, double reach_mm = std::numeric_limits<double>::infinity(),
+                                   const Context& context = {}) const;
   [[nodiscard]] const VoxelBits& inside() const { return inside_; }
   [[nodiscard]] const InsideReport& inside_report() const { return report_; }
   [[nodiscard]] const TriangleTree& tree() const { return tree_; }

@@ -89,8 +89,8 @@ class BrickGrid {
   std::unique_ptr<float[]> values_;
 };
 
-/// All leaves that hold a value > 0. O(stored voxels).
-[[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid);
+/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels).
+[[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid, bool all = false);
 /// Bricks with only zeros are left out; equal values come back bit for bit.
 [[nodiscard]] SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name);
 

@@ -23,7 +23,7 @@ struct SnapshotParams {
 };
 
 struct SnapshotSubjects {
-  Data subject;  ///< image, labels, grid or surface
+  Data subject;  ///< image, labels, grid, surface or tets
   Data mask;     ///< labels or grid, tinted over the cuts; optional. Labels with structures: in their colours, in 3D inside clear bone
   Data surface;  ///< shown in 3D instead of one made here; optional
 };

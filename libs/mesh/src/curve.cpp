@@ -1,0 +1,192 @@
+#include "osteo/mesh/curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "osteo/base/error.h"
+
+namespace osteo {
+
+Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end()) {
+  if (points_.size() < 2) throw Error(ExitCode::corrupt, "a curve needs at least two points; this has " + std::to_string(points_.size()));
+  Vec3 lo = points_[0], hi = points_[0];
+  arcs_.reserve(points_.size());
+  double arc = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Vec3 p = points_[i];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      throw Error(ExitCode::corrupt, "point " + std::to_string(i) + " of the curve has a coordinate that is no finite number");
+    }
+    if (i > 0) arc += length(p - points_[i - 1]);
+    arcs_.push_back(arc);
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], p[a]);
+      hi[a] = std::max(hi[a], p[a]);
+    }
+  }
+  centre_ = (lo + hi) * 0.5;
+  rounding_ = (length(hi - lo) + arc) * 4e-7;
+  const float below = -std::numeric_limits<float>::infinity(), above = std::numeric_limits<float>::infinity();
+  std::size_t items = (points_.size() - 1 + 15) / 16;
+  for (int level = 0;; ++level) {
+    const std::size_t groups = (items + 15) / 16;
+    std::vector<Group> boxes(groups);
+    for (std::size_t g = 0; g < groups; ++g) {
+      for (std::size_t s = 0; s < 16; ++s) {
+        const std::size_t item = g * 16 + s;
+        Group& group = boxes[g];
+        for (std::size_t a = 0; a < 3; ++a) group.lo[a][s] = group.hi[a][s] = 1e30F;  // far away: never nearest
+        group.arc_lo[s] = group.arc_hi[s] = 0;
+        if (item >= items) continue;
+        float low[3] = {above, above, above}, high[3] = {below, below, below};
+        if (level == 0) {
+          const std::size_t first = item * 16, last = std::min(points_.size() - 1, first + 16);
+          for (std::size_t i = first; i <= last; ++i) {
+            for (std::size_t a = 0; a < 3; ++a) {
+              const auto v = static_cast<float>(points_[i][a] - centre_[a]);
+              low[a] = std::min(low[a], std::nextafterf(v, below));
+              high[a] = std::max(high[a], std::nextafterf(v, above));
+            }
+          }
+          group.arc_lo[s] = std::nextafterf(static_cast<float>(arcs_[first]), below);
+          group.arc_hi[s] = std::nextafterf(static_cast<float>(arcs_[last]), above);
+        } else {
+          const Group& from = levels_.back()[item];
+          const std::size_t below_items = level == 1 ? (points_.size() - 1 + 15) / 16 : levels_[levels_.size() - 2].size();
+          const std::size_t n = std::min<std::size_t>(16, below_items - item * 16);
+          for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t a = 0; a < 3; ++a) {
+              low[a] = std::min(low[a], from.lo[a][i]);
+              high[a] = std::max(high[a], from.hi[a][i]);
+            }
+          }
+          group.arc_lo[s] = from.arc_lo[0];
+          group.arc_hi[s] = from.arc_hi[n - 1];
+        }
+        for (std::size_t a = 0; a < 3; ++a) {
+          group.lo[a][s] = low[a];
+          group.hi[a][s] = high[a];
+        }
+      }
+    }
+    levels_.push_back(std::move(boxes));
+    items = groups;
+    if (groups == 1) break;
+  }
+}
+
+// Lower bounds of the score in sixteen boxes. Compiled for wider vectors too and chosen when the program starts; same bits.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
+__attribute__((target_clones("avx512f", "avx2", "default"), optimize("O3")))
+#endif
+void Curve::bounds(const Group& g, const float p[3], float arc, float penalty, float out[16]) {
+  for (int i = 0; i < 16; ++i) {
+    const float x = std::max(std::max(g.lo[0][i] - p[0], p[0] - g.hi[0][i]), 0.0F);
+    const float y = std::max(std::max(g.lo[1][i] - p[1], p[1] - g.hi[1][i]), 0.0F);
+    const float z = std::max(std::max(g.lo[2][i] - p[2], p[2] - g.hi[2][i]), 0.0F);
+    const float way = std::max(std::max(g.arc_lo[i] - arc, arc - g.arc_hi[i]), 0.0F);
+    out[i] = __builtin_sqrtf(x * x + y * y + z * z) + penalty * way;
+  }
+}
+
+CurvePoint Curve::on_segment(std::uint32_t segment, Vec3 p, double arc, double penalty) const {
+  const Vec3 a = points_[segment], b = points_[segment + 1];
+  const double l = arcs_[segment + 1] - arcs_[segment];
+  CurvePoint r;
+  r.segment = segment;
+  if (!(l > 0)) {
+    r.point_mm = a;
+    r.arc_mm = arcs_[segment];
+    r.distance_mm = length(p - a);
+    r.score_mm = r.distance_mm + penalty * std::abs(r.arc_mm - arc);
+    return r;
+  }
+  const Vec3 direction = (b - a) / l;
+  const double foot = dot(p - a, direction);
+  const double height = length((p - a) - direction * foot);
+  const auto score = [&](double s) { return std::sqrt(height * height + (s - foot) * (s - foot)) + penalty * std::abs(arcs_[segment] + s - arc); };
+  // The score is convex along the segment: its minimum is where distance grows as fast as the penalty falls, on either side of
+  // where the constraint was, or there itself.
+  double best = std::clamp(foot, 0.0, l);
+  if (penalty > 0) {
+    const double here = std::clamp(arc - arcs_[segment], 0.0, l);
+    best = here;
+    double low = score(here);
+    if (penalty < 1) {
+      const double shift = penalty * height / std::sqrt(1 - penalty * penalty);
+      const double ahead = std::clamp(foot - shift, here, l);  // the part beyond `here` pays for going on
+      const double back = std::clamp(foot + shift, 0.0, here);
+      if (score(ahead) < low) low = score(ahead), best = ahead;
+      if (score(back) < low) best = back;
+    }
+  }
+  r.t = best / l;
+  r.point_mm = r.t >= 1 ? b : a + (b - a) * r.t;
+  r.arc_mm = arcs_[segment] + best;
+  r.distance_mm = length(p - r.point_mm);
+  r.score_mm = r.distance_mm + penalty * std::abs(r.arc_mm - arc);
+  return r;
+}
+
+CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint) const {
+  struct Entry {
+    float bound;
+    std::uint32_t item;
+    int level;
+  };
+  Entry stack[16 * 8];
+  int top = 0;
+  const auto last_segment = static_cast<std::uint32_t>(points_.size() - 2);
+  CurvePoint best = on_segment(std::min(hint, last_segment), p, arc, penalty);
+  const Vec3 q = p - centre_;
+  const float pf[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
+  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7;
+  float reach = 0;
+  const auto set_reach = [&] { reach = static_cast<float>(best.score_mm + (1 + penalty) * rounding); };
+  set_reach();
+  stack[top++] = {0, 0, static_cast<int>(levels_.size())};
+  while (top > 0) {
+    const Entry e = stack[--top];
+    if (e.bound > reach) continue;
+    if (e.level == 0) {
+      const std::uint32_t first = e.item * 16, last = std::min(first + 15, last_segment);
+      for (std::uint32_t s = first; s <= last; ++s) {
+        const CurvePoint c = on_segment(s, p, arc, penalty);
+        if (c.score_mm < best.score_mm || (c.score_mm == best.score_mm && c.segment < best.segment)) {
+          best = c;
+          set_reach();
+        }
+      }
+      continue;
+    }
+    float bound[16];
+    bounds(levels_[static_cast<std::size_t>(e.level - 1)][e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
+    const int begin = top;
+    for (std::uint32_t i = 0; i < 16; ++i) {
+      if (!(bound[i] <= reach)) continue;
+      int at = top++;
+      while (at > begin && stack[at - 1].bound < bound[i]) {
+        stack[at] = stack[at - 1];
+        --at;
+      }
+      stack[at] = {bound[i], e.item * 16 + i, e.level - 1};
+    }
+  }
+  return best;
+}
+
+CurvePoint Curve::at_arc(double arc) const {
+  const double a = std::clamp(arc, 0.0, arcs_.back());
+  auto it = std::upper_bound(arcs_.begin(), arcs_.end(), a);
+  const auto segment = static_cast<std::uint32_t>(std::clamp<std::ptrdiff_t>(it - arcs_.begin() - 1, 0, static_cast<std::ptrdiff_t>(points_.size()) - 2));
+  CurvePoint r;
+  r.segment = segment;
+  const double l = arcs_[segment + 1] - arcs_[segment];
+  r.t = l > 0 ? (a - arcs_[segment]) / l : 0;
+  r.arc_mm = a;
+  r.point_mm = points_[segment] + (points_[segment + 1] - points_[segment]) * r.t;
+  return r;
+}
+
+}  // namespace osteo
