@@ -12,8 +12,16 @@ int main(int argc, char** argv) {
   // Import first: it measures in processes of its own, which must start before any thread does.
   if (subject == "import" || subject == "all") osteo::bench_import(context);
   if (subject == "bone" || subject == "all") osteo::bench_bone(context);
-  if (subject != "all" && subject != "import" && subject != "bone") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, import\n", subject.c_str());
+#ifdef OSTEO_BENCH_GEOMETRY
+  if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
+#else
+  if (subject == "geometry") {
+    std::fprintf(stderr, "osteo_bench: geometry needs a build with CGAL and TetGen, and the packages libembree-dev and libnanoflann-dev\n");
+    return 2;
+  }
+#endif
+  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry") {
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, import\n", subject.c_str());
     return 2;
   }
   return 0;

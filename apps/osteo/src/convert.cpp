@@ -59,7 +59,7 @@ cli::CommandInfo BenchCommand::info() {
   return {"bench",
           "speed against error, beside the peers, in one run",
           "Prints the tables of docs/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release --target osteo_bench'.",
-          {{"subject", "all, bone or import", true}},
+          {{"subject", "all, bone, geometry or import", true}},
           "osteo bench import"};
 }
 

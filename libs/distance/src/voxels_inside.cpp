@@ -52,12 +52,18 @@ struct Crossing {
   std::int32_t delta;
 };
 
+// Rounding up of what fits an int; std::ceil is a call without SSE 4.1.
+int round_up(double x) {
+  const int i = static_cast<int>(x);
+  return i + (static_cast<double>(i) < x ? 1 : 0);
+}
+
 // Scan conversion in index coordinates.
 void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, const std::array<int, 3>& dims, std::vector<Crossing>& out) {
-  const double lowest = std::min({a.z, b.z, c.z}), highest = std::max({a.z, b.z, c.z});
+  const double lowest = std::min(a.z, std::min(b.z, c.z)), highest = std::max(a.z, std::max(b.z, c.z));
   if (highest < 0 || lowest >= dims[2]) return;
-  const int k0 = lowest < 0 ? 0 : static_cast<int>(std::floor(lowest)) + 1;
-  const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(std::floor(highest));
+  const int k0 = lowest < 0 ? 0 : static_cast<int>(lowest) + 1;
+  const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(highest);
   for (int k = k0; k <= k1; ++k) {
     const Cut s = cut(a, b, c, k);
     // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray leaves.
@@ -65,14 +71,14 @@ void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, cons
     const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];
     if (!(y1 >= 0) || y0 > dims[1] - 1) continue;
     const double x0 = leaves ? s.x[1] : s.x[0], x1 = leaves ? s.x[0] : s.x[1];
-    const int j0 = y0 <= 0 ? 0 : static_cast<int>(std::ceil(y0));
-    const int j1 = y1 > dims[1] - 1 ? dims[1] : static_cast<int>(std::ceil(y1));
+    const int j0 = y0 <= 0 ? 0 : round_up(y0);
+    const int j1 = y1 > dims[1] - 1 ? dims[1] : round_up(y1);
     const double slope = y1 > y0 ? (x1 - x0) / (y1 - y0) : 0;
     for (int j = j0; j < j1; ++j) {
       const double at = std::clamp(x0 + (j - y0) * slope, std::min(x0, x1), std::max(x0, x1));
       if (at > dims[0] - 1) continue;
       out.push_back({static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(dims[1]) + static_cast<std::uint32_t>(j),
-                     at <= 0 ? 0 : static_cast<std::int32_t>(std::ceil(at)), leaves ? -weight : weight});
+                     at <= 0 ? 0 : round_up(at), leaves ? -weight : weight});
     }
   }
 }
@@ -170,6 +176,7 @@ RowCrossings scan(const TriangleSoup& soup, const std::vector<Vec3>& points, con
   parallel_for(n, kGrain, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
     auto& part = parts[begin / kGrain];
+    part.reserve(end - begin);
     for (std::size_t t = begin; t < end; ++t) {
       const auto& v = soup.triangles[t];
       scan_triangle(points[v[0]], points[v[1]], points[v[2]], 1, dims, part);

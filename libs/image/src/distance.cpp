@@ -1,5 +1,6 @@
 #include "osteo/image/distance.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -10,33 +11,74 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Lower envelope of the parabolas f[i] + (h (x - i))^2 along one line; f is replaced by the envelope.
-void transform_line(float* f, std::size_t stride, int n, double h, std::vector<double>& value, std::vector<int>& site,
-                    std::vector<double>& from) {
+// Along a row the nearest voxel of the mask is the last one before or the first one after.
+void transform_row(const std::uint8_t* mask, std::uint8_t value, float* d, int n, double h) {
+  int last = -1;
+  for (int i = 0; i < n; ++i) {
+    if (mask[i] == value) last = i;
+    d[i] = last < 0 ? kInfinity : static_cast<float>(i - last);
+  }
+  int next = -1;
+  for (int i = n - 1; i >= 0; --i) {
+    if (mask[i] == value) next = i;
+    const float steps = next < 0 ? d[i] : std::min(d[i], static_cast<float>(next - i));
+    d[i] = steps == kInfinity ? kInfinity : static_cast<float>((static_cast<double>(steps) * h) * (static_cast<double>(steps) * h));
+  }
+}
+
+struct Parabola {
+  double value;  // f / h^2 + i^2
+  double from;   // lowest from here on
+  int site;
+};
+
+// Lower envelope of the parabolas f[i] + (h (x - i))^2; f is replaced by the envelope. `lower` has room for n.
+void transform_line(float* f, int n, double h, Parabola* lower) {
+  const double scale = 1 / (h * h);
   int count = 0;
   for (int i = 0; i < n; ++i) {
-    const float fi = f[static_cast<std::size_t>(i) * stride];
-    if (fi == kInfinity) continue;
-    const double v = static_cast<double>(fi) / (h * h);
+    if (f[i] == kInfinity) continue;
+    const double v = static_cast<double>(f[i]) * scale + static_cast<double>(i) * i;
     double start = -std::numeric_limits<double>::infinity();
     while (count > 0) {
-      const int j = site[static_cast<std::size_t>(count - 1)];
-      const double vj = value[static_cast<std::size_t>(count - 1)];
-      start = ((v + static_cast<double>(i) * i) - (vj + static_cast<double>(j) * j)) / (2.0 * (i - j));
-      if (start > from[static_cast<std::size_t>(count - 1)]) break;
+      const Parabola& p = lower[count - 1];
+      start = (v - p.value) / (2.0 * (i - p.site));
+      if (start > p.from) break;
       --count;
       start = -std::numeric_limits<double>::infinity();
     }
-    const auto c = static_cast<std::size_t>(count++);
-    site[c] = i;
-    value[c] = v;
-    from[c] = start;
+    lower[count++] = {v, start, i};
   }
   if (count == 0) return;
   for (int x = 0, k = 0; x < n; ++x) {
-    while (k + 1 < count && from[static_cast<std::size_t>(k + 1)] < x) ++k;
-    const double d = x - site[static_cast<std::size_t>(k)];
-    f[static_cast<std::size_t>(x) * stride] = static_cast<float>((value[static_cast<std::size_t>(k)] + d * d) * h * h);
+    while (k + 1 < count && lower[k + 1].from < x) ++k;
+    const Parabola& p = lower[k];
+    const double d = x - p.site;
+    f[x] = static_cast<float>((p.value - static_cast<double>(p.site) * p.site + d * d) * h * h);
+  }
+}
+
+// Lines along a strided axis, a handful at a time: rows of memory are read whole, and turned into lines in the cache.
+constexpr std::size_t kTogether = 32;
+
+void transform_lines(float* f, std::size_t stride, int n, double h, std::size_t lines, std::vector<float>& turned, std::vector<Parabola>& lower) {
+  const auto length = static_cast<std::size_t>(n);
+  turned.resize(length * kTogether);
+  lower.resize(length);
+  bool any = false, settled = true;
+  for (std::size_t i = 0; i < length; ++i) {
+    const float* const row = f + i * stride;
+    for (std::size_t l = 0; l < lines; ++l) {
+      turned[l * length + i] = row[l];
+      any |= row[l] != kInfinity;
+      settled &= row[l] == 0;
+    }
+  }
+  if (!any || settled) return;
+  for (std::size_t l = 0; l < lines; ++l) transform_line(turned.data() + l * length, n, h, lower.data());
+  for (std::size_t i = 0; i < length; ++i) {
+    float* const row = f + i * stride;
+    for (std::size_t l = 0; l < lines; ++l) row[l] = turned[l * length + i];
   }
 }
 
@@ -45,27 +87,36 @@ void transform_line(float* f, std::size_t stride, int n, double h, std::vector<d
 std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value,
                                         const Context& context) {
   std::vector<float> d(mask.size());
-  for (std::size_t i = 0; i < d.size(); ++i) d[i] = mask[i] == value ? 0.0F : kInfinity;
   const auto nx = static_cast<std::size_t>(frame.dims[0]);
   const auto ny = static_cast<std::size_t>(frame.dims[1]);
   const auto nz = static_cast<std::size_t>(frame.dims[2]);
-  const auto run_axis = [&](std::size_t axis, std::size_t lines, auto start_of_line, std::size_t stride) {
-    context.check_cancelled();
-    const int n = frame.dims[axis];
-    parallel_for(lines, 256, context.threads, [&](std::size_t begin, std::size_t end) {
-      std::vector<double> v(static_cast<std::size_t>(n)), from(static_cast<std::size_t>(n));
-      std::vector<int> site(static_cast<std::size_t>(n));
-      for (std::size_t l = begin; l < end; ++l) {
-        transform_line(d.data() + start_of_line(l), stride, n, frame.spacing_mm[axis], v, site, from);
+  const std::size_t strips = (nx + kTogether - 1) / kTogether;
+  // Rows and columns of one slice while it is in the cache.
+  parallel_for(nz, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> turned;
+    std::vector<Parabola> lower;
+    for (std::size_t k = begin; k < end; ++k) {
+      context.check_cancelled();
+      float* const slice = d.data() + k * nx * ny;
+      for (std::size_t j = 0; j < ny; ++j) {
+        transform_row(mask.data() + k * nx * ny + j * nx, value, slice + j * nx, frame.dims[0], frame.spacing_mm.x);
       }
-    });
-  };
-  run_axis(
-      0, ny * nz, [&](std::size_t l) { return l * nx; }, 1);
-  run_axis(
-      1, nx * nz, [&](std::size_t l) { return (l / nx) * nx * ny + l % nx; }, nx);
-  run_axis(
-      2, nx * ny, [&](std::size_t l) { return l; }, nx * ny);
+      for (std::size_t s = 0; s < strips; ++s) {
+        transform_lines(slice + s * kTogether, nx, frame.dims[1], frame.spacing_mm.y, std::min(kTogether, nx - s * kTogether), turned, lower);
+      }
+    }
+  });
+  parallel_for(ny, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> turned;
+    std::vector<Parabola> lower;
+    for (std::size_t j = begin; j < end; ++j) {
+      context.check_cancelled();
+      for (std::size_t s = 0; s < strips; ++s) {
+        transform_lines(d.data() + j * nx + s * kTogether, nx * ny, frame.dims[2], frame.spacing_mm.z, std::min(kTogether, nx - s * kTogether), turned,
+                        lower);
+      }
+    }
+  });
   return d;
 }
 

@@ -26,7 +26,19 @@ Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end(
     }
   }
   centre_ = (lo + hi) * 0.5;
-  rounding_ = (length(hi - lo) + arc) * 4e-7;
+  rounding_ = (length(hi - lo) + arc) * 2.5e-7;
+  leaves_.resize((points_.size() - 1 + 15) / 16);
+  for (std::size_t s = 0; s < leaves_.size() * 16; ++s) {
+    Leaf& leaf = leaves_[s / 16];
+    const std::size_t i = s % 16, from = std::min(s, points_.size() - 2);
+    const double l = arcs_[from + 1] - arcs_[from];
+    for (std::size_t a = 0; a < 3; ++a) {
+      leaf.at[a][i] = s == from ? static_cast<float>(points_[from][a] - centre_[a]) : 1e15F;
+      leaf.direction[a][i] = l > 0 ? static_cast<float>((points_[from + 1][a] - points_[from][a]) / l) : 0.0F;
+    }
+    leaf.length[i] = static_cast<float>(l);
+    leaf.arc[i] = static_cast<float>(arcs_[from]);
+  }
   const float below = -std::numeric_limits<float>::infinity(), above = std::numeric_limits<float>::infinity();
   std::size_t items = (points_.size() - 1 + 15) / 16;
   for (int level = 0;; ++level) {
@@ -76,10 +88,26 @@ Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end(
   }
 }
 
-// Lower bounds of the score in sixteen boxes. Compiled for wider vectors too and chosen when the program starts; same bits.
+// Compiled for wider vectors too; which one runs is chosen when the program starts. The same bits from each.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
-__attribute__((target_clones("avx512f", "avx2", "default"), optimize("O3")))
+#define OSTEO_WIDE __attribute__((target_clones("avx512f", "avx2", "default"), optimize("O3")))
+#else
+#define OSTEO_WIDE
 #endif
+
+// Lower bounds of the score on sixteen segments: the distance to each, and the way to its nearer end.
+OSTEO_WIDE void Curve::leaf_bounds(const Leaf& g, const float p[3], float arc, float penalty, float out[16]) {
+  for (int i = 0; i < 16; ++i) {
+    const float x = p[0] - g.at[0][i], y = p[1] - g.at[1][i], z = p[2] - g.at[2][i];
+    const float foot = std::min(std::max(x * g.direction[0][i] + y * g.direction[1][i] + z * g.direction[2][i], 0.0F), g.length[i]);
+    const float rx = x - foot * g.direction[0][i], ry = y - foot * g.direction[1][i], rz = z - foot * g.direction[2][i];
+    const float way = std::max(std::max(g.arc[i] - arc, arc - g.arc[i] - g.length[i]), 0.0F);
+    out[i] = __builtin_sqrtf(rx * rx + ry * ry + rz * rz) + penalty * way;
+  }
+}
+
+// The same in sixteen boxes.
+OSTEO_WIDE
 void Curve::bounds(const Group& g, const float p[3], float arc, float penalty, float out[16]) {
   for (int i = 0; i < 16; ++i) {
     const float x = std::max(std::max(g.lo[0][i] - p[0], p[0] - g.hi[0][i]), 0.0F);
@@ -141,7 +169,7 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
   CurvePoint best = on_segment(std::min(hint, last_segment), p, arc, penalty);
   const Vec3 q = p - centre_;
   const float pf[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7;
+  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 2.5e-7;
   float reach = 0;
   const auto set_reach = [&] { reach = static_cast<float>(best.score_mm + (1 + penalty) * rounding); };
   set_reach();
@@ -150,8 +178,16 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
     const Entry e = stack[--top];
     if (e.bound > reach) continue;
     if (e.level == 0) {
-      const std::uint32_t first = e.item * 16, last = std::min(first + 15, last_segment);
-      for (std::uint32_t s = first; s <= last; ++s) {
+      float bound[16];
+      leaf_bounds(leaves_[e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
+      // The nearest first: it brings the reach down for the others.
+      int first = 0;
+      for (int i = 1; i < 16; ++i) first = bound[i] < bound[first] ? i : first;
+      for (int n = 0; n < 17; ++n) {
+        const int i = n == 0 ? first : n - 1;
+        if (!(bound[i] <= reach) || (n > 0 && i == first)) continue;
+        const std::uint32_t s = e.item * 16 + static_cast<std::uint32_t>(i);
+        if (s > last_segment) continue;
         const CurvePoint c = on_segment(s, p, arc, penalty);
         if (c.score_mm < best.score_mm || (c.score_mm == best.score_mm && c.segment < best.segment)) {
           best = c;

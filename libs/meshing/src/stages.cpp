@@ -198,7 +198,7 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
     case TetMethod::tetgen:
 #ifdef OSTEO_WITH_TETGEN
       // A regular tetrahedron's volume is 0.118 of its edge's cube.
-      mesh = tets_by_tetgen(soup, {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 10}, work);
+      mesh = tets_by_tetgen(soup, {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0}, work);
       break;
 #else
       throw not_built("TetGen", "OSTEO_TETGEN");

@@ -35,7 +35,8 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
     f.polygonlist[0].vertexlist = new int[3];
     for (std::size_t k = 0; k < 3; ++k) f.polygonlist[0].vertexlist[k] = static_cast<int>(used.soup.triangles[i][k]);
   }
-  std::string switches = "pQq" + format_number(options.radius_edge_ratio) + "/" + format_number(options.min_dihedral_deg);
+  std::string switches = "pQq" + format_number(options.radius_edge_ratio);
+  if (options.min_dihedral_deg > 0) switches += "/" + format_number(options.min_dihedral_deg);
   if (options.max_volume_mm3 > 0) switches += "a" + format_number(options.max_volume_mm3);
   context.progress(0.2, "meshing");
   try {

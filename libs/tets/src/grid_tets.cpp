@@ -96,18 +96,33 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
         std::uint32_t before[4];  // points of the row before this word
         for (int q = 0; q < 4; ++q) before[q] = static_cast<std::uint32_t>(first_point[rows[q]]);
         for (std::size_t w = 0; w < voxels.words_per_row; ++w) {
-          const std::uint64_t bits = voxels.words[voxels.row(j, k) + w];
-          for (std::uint64_t rest = bits; rest != 0; rest &= rest - 1) {
-            const int i = std::countr_zero(rest);
-            std::uint32_t v[8];
+          std::uint64_t bits = voxels.words[voxels.row(j, k) + w];
+          while (bits != 0) {
+            // A run of voxels: the corners along it are numbered one after the other, so each voxel has the tetrahedra of the
+            // one before with 1 added, in the two patterns by turns.
+            const int start = std::countr_zero(bits), length = std::countr_one(bits >> start);
+            bits = start + length == 64 ? 0 : bits & (~0ULL << (start + length));
+            std::uint32_t corner_of[8];
             for (int q = 0; q < 4; ++q) {
-              // The corners at i and i + 1 are both in use, so their numbers follow each other.
-              const std::uint64_t lower = used[rows[q] * words + w] & ((1ULL << i) - 1);
-              v[2 * q] = before[q] + static_cast<std::uint32_t>(std::popcount(lower));
-              v[2 * q + 1] = v[2 * q] + 1;
+              const std::uint64_t lower = used[rows[q] * words + w] & ((1ULL << start) - 1);
+              corner_of[2 * q] = before[q] + static_cast<std::uint32_t>(std::popcount(lower));
+              corner_of[2 * q + 1] = corner_of[2 * q] + 1;
             }
-            const FiveTets& five = patterns[(i + j + k) & 1];
-            for (const auto& t : five) *out++ = {v[t[0]], v[t[1]], v[t[2]], v[t[3]]};
+            std::uint32_t first[2][20];
+            for (int n = 0; n < 2; ++n) {
+              const FiveTets& five = patterns[(start + n + j + k) & 1];
+              for (std::size_t t = 0; t < 5; ++t) {
+                for (std::size_t c = 0; c < 4; ++c) first[n][4 * t + c] = corner_of[five[t][c]] + static_cast<std::uint32_t>(n);
+              }
+            }
+            auto* flat = out->data();
+            for (int n = 0; n < length; ++n) {
+              const std::uint32_t* const from = first[n & 1];
+              const auto further = static_cast<std::uint32_t>(n & ~1);
+              for (int c = 0; c < 20; ++c) flat[c] = from[c] + further;
+              flat += 20;
+            }
+            out += 5 * static_cast<std::ptrdiff_t>(length);
           }
           for (int q = 0; q < 4; ++q) before[q] += static_cast<std::uint32_t>(std::popcount(used[rows[q] * words + w]));
         }

@@ -19,10 +19,11 @@ constexpr double kLong = 0.24999, kShort = 0.41189;
 struct Lattice {
   Frame frame;                // at half the spacing
   std::array<int, 3> n{};     // its dims
-  BigArray<float> value;      // signed distance in half spacings, capped at +-3; read at lattice points only
+  std::array<std::size_t, 3> half{};  // points of either kind along each axis
+  BigArray<float> value;              // signed distance in half spacings, capped at +-3; even points, then odd ones
   [[nodiscard]] std::size_t at(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(n[0]) +
-           static_cast<std::size_t>(x);
+    const auto h = [](int v) { return static_cast<std::size_t>(v >> 1); };
+    return ((static_cast<std::size_t>(z & 1) * half[2] + h(z)) * half[1] + h(y)) * half[0] + h(x);
   }
 };
 
@@ -46,10 +47,11 @@ Lattice sample(const TriangleSoup& surface, double spacing_mm, const Context& co
   }
   const double reach = 2.1 * spacing_mm / 2;  // an edge is at most 2 half spacings long
   const DistanceMap map = mapper.map_of(wanted, reach, context.sub(0.4, 0.7));
-  lattice.value.resize(f.voxel_count());
+  for (std::size_t a = 0; a < 3; ++a) lattice.half[a] = static_cast<std::size_t>((f.dims[a] + 1) / 2);
+  lattice.value.resize(2 * lattice.half[0] * lattice.half[1] * lattice.half[2]);
   for (int z = 0; z < f.dims[2]; ++z) {
-    for (int y = 0; y < f.dims[1]; ++y) {
-      for (int x = 0; x < f.dims[0]; ++x) lattice.value[lattice.at(x, y, z)] = mapper.inside().at(x, y, z) ? -3.0F : 3.0F;
+    for (int y = z & 1; y < f.dims[1]; y += 2) {
+      for (int x = z & 1; x < f.dims[0]; x += 2) lattice.value[lattice.at(x, y, z)] = mapper.inside().at(x, y, z) ? -3.0F : 3.0F;
     }
   }
   for (std::size_t b = 0; b < map.bricks.size(); ++b) {
@@ -67,8 +69,10 @@ constexpr std::array<std::array<int, 3>, 14> kEdges{{{2, 0, 0}, {-2, 0, 0}, {0, 
                                                      {1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {-1, -1, 1}, {1, 1, -1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, -1}}};
 
 class Stuffer {
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+
  public:
-  Stuffer(Lattice& lattice, const Context& context) : l_(lattice), context_(context) {}
+  Stuffer(Lattice& lattice, const Context& context) : l_(lattice), context_(context), points_(lattice.value.size(), kNone) {}
 
   TetMesh run() {
     warp();
@@ -132,12 +136,11 @@ class Stuffer {
   }
   std::uint32_t point(const Corner& c) {
     const std::size_t id = l_.at(c.at[0], c.at[1], c.at[2]);
-    const auto [it, made] = points_.try_emplace(id, 0);
-    if (made) {
+    if (points_[id] == kNone) {
       const auto w = c.value == 0 ? warped_.find(id) : warped_.end();
-      it->second = add(w != warped_.end() ? w->second : Vec3{double(c.at[0]), double(c.at[1]), double(c.at[2])});
+      points_[id] = add(w != warped_.end() ? w->second : Vec3{double(c.at[0]), double(c.at[1]), double(c.at[2])});
     }
-    return it->second;
+    return points_[id];
   }
   // Where the surface cuts the edge from a (inside) to b (outside).
   std::uint32_t cut(const Corner& a, const Corner& b) {
@@ -306,7 +309,7 @@ class Stuffer {
   const Context& context_;
   TetMesh mesh_;
   std::unordered_map<std::size_t, Vec3> warped_;
-  std::unordered_map<std::size_t, std::uint32_t> points_;
+  std::vector<std::uint32_t> points_;  // by lattice point
   std::unordered_map<std::uint64_t, std::uint32_t> cuts_;
 };
 
