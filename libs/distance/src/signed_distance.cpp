@@ -8,10 +8,12 @@
 namespace osteo {
 
 SignedDistance::SignedDistance(const TriangleSoup& soup, const Context& context) : tree_(soup, context) {
-  closed_ = is_closed(soup);
   Ordered mended;
-  if (!closed_) mended = ordered(soup, context);
-  surface_ = closed_ ? soup : mended.soup;
+  surface_ = is_closed(soup) ? soup : welded(soup);
+  if (!is_closed(surface_)) {
+    mended = ordered(soup, context);
+    surface_ = mended.soup;
+  }
   fans_ = closing_fans(mended, surface_.points_mm);
   closed_ = fans_.empty();
   if (!surface_.triangles.empty()) ray_tree_ = TriangleTree(surface_, context);

@@ -1,17 +1,17 @@
 // What a TriangleTree holds. Private to libs/distance.
 #pragma once
-#include <memory>
 #include <vector>
 
 #include "kernel.h"
+#include "osteo/base/big_array.h"
 #include "osteo/distance/triangle_tree.h"
 
 namespace osteo {
 
 struct TriangleTree::Data {
   distance::TreeView view{};
-  std::unique_ptr<distance::TriangleRecord[]> records;
-  std::unique_ptr<distance::ExactTriangle[]> exact;
+  BigArray<distance::TriangleRecord> records;
+  BigArray<distance::ExactTriangle> exact;
   std::vector<std::vector<distance::BoxGroup>> boxes;
   std::vector<std::uint32_t> original;  ///< tree order -> soup
   std::vector<std::uint32_t> rank;      ///< soup -> tree order

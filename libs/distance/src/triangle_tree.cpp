@@ -244,8 +244,8 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   d.view.triangles = static_cast<std::uint32_t>(n);
   // Rounding of coordinates up to 128 and of the sums made of them.
   d.view.margin = 128 * 12 * 6e-8F;
-  d.exact = std::make_unique_for_overwrite<distance::ExactTriangle[]>(padded);
-  d.records = std::make_unique_for_overwrite<distance::TriangleRecord[]>(padded);
+  d.exact.resize(padded);
+  d.records.resize(padded);
   d.original.resize(n);
   d.rank.resize(n);
   parallel_for(n, 4096, context.threads, [&](std::size_t begin, std::size_t end) {
@@ -267,8 +267,8 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
     if (r.face > 0) d.area += 0.5 * static_cast<double>(r.u_length * r.v_length) / std::sqrt(static_cast<double>(r.face));
   }
   distance::build_boxes(d, context);
-  d.view.records = d.records.get();
-  d.view.exact = d.exact.get();
+  d.view.records = d.records.data();
+  d.view.exact = d.exact.data();
   data_ = std::move(made);
 }
 

@@ -248,10 +248,14 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
   require_sound(soup);
   if (static_cast<double>(frame.dims[1]) * frame.dims[2] > 4e9) throw Error(ExitCode::resources, "the grid has more than 4e9 rows");
   // A closed surface needs no order made: its winding number is whole as it is.
-  const bool closed = is_closed(soup);
+  bool closed = is_closed(soup);
   Ordered mended;
-  if (!closed) mended = ordered(soup, context);
-  const TriangleSoup& used = closed ? soup : mended.soup;
+  if (!closed) {
+    mended.soup = welded(soup);
+    closed = is_closed(mended.soup);
+    if (!closed) mended = ordered(soup, context);
+  }
+  const TriangleSoup& used = mended.soup.triangles.empty() ? soup : mended.soup;
   context.progress(0.3, "telling inside from outside");
   std::vector<Vec3> points(used.points_mm.size());
   const Mat3 back = inverse(frame.direction);

@@ -2,7 +2,6 @@
 
 #include <vtkImageData.h>
 #include <vtkNew.h>
-#include <vtkOBJReader.h>
 #include <vtkPLYReader.h>
 #include <vtkPNGReader.h>
 #include <vtkPNGWriter.h>
@@ -56,7 +55,7 @@ Surface load_surface(const fs::path& path) {
   vtkSmartPointer<vtkPolyData> poly;
   if (e == ".ply") poly = read_with<vtkPLYReader>(path);
   if (e == ".stl") poly = read_with<vtkSTLReader>(path);
-  if (e == ".obj") poly = read_with<vtkOBJReader>(path);
+  if (e == ".obj") poly = io::read_obj(path);
   if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
   if (!poly)
     throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");

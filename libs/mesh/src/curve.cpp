@@ -26,7 +26,8 @@ Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end(
     }
   }
   centre_ = (lo + hi) * 0.5;
-  rounding_ = (length(hi - lo) + arc) * 2.5e-7;
+  rounding_ = length(hi - lo) * 4e-7;
+  arc_rounding_ = arc * 2e-7;
   leaves_.resize((points_.size() - 1 + 15) / 16);
   for (std::size_t s = 0; s < leaves_.size() * 16; ++s) {
     Leaf& leaf = leaves_[s / 16];
@@ -169,9 +170,9 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
   CurvePoint best = on_segment(std::min(hint, last_segment), p, arc, penalty);
   const Vec3 q = p - centre_;
   const float pf[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 2.5e-7;
+  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7 + penalty * (arc_rounding_ + std::abs(arc) * 2e-7);
   float reach = 0;
-  const auto set_reach = [&] { reach = static_cast<float>(best.score_mm + (1 + penalty) * rounding); };
+  const auto set_reach = [&] { reach = static_cast<float>(best.score_mm * (1 + 4e-7) + rounding); };
   set_reach();
   stack[top++] = {0, 0, static_cast<int>(levels_.size())};
   while (top > 0) {

@@ -194,6 +194,16 @@ bool is_closed(const TriangleSoup& soup) {
   return sum == 0;
 }
 
+TriangleSoup welded(const TriangleSoup& soup) {
+  std::uint64_t count = 0;
+  const std::vector<std::uint32_t> first = representatives(soup.points_mm, count);
+  TriangleSoup result = soup;
+  for (auto& t : result.triangles) {
+    for (auto& v : t) v = first[v];
+  }
+  return result;
+}
+
 Ordered ordered(const TriangleSoup& input, const Context& context) {
   Ordered result;
   const std::vector<std::uint32_t> first = representatives(input.points_mm, result.welded_points);

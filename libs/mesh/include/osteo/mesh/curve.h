@@ -54,7 +54,7 @@ class Curve {
   std::vector<std::vector<Group>> levels_;  // level 0: a box is 16 segments
   std::vector<Leaf> leaves_;
   Vec3 centre_;
-  double rounding_ = 0;  // of single-precision bounds, mm
+  double rounding_ = 0, arc_rounding_ = 0;  // of single-precision bounds, mm
 };
 
 }  // namespace osteo

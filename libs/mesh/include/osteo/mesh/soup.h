@@ -32,6 +32,9 @@ struct OpenEdge {
 /// compares fingerprints of 64 bits, so a surface that is not closed passes with probability 2^-64.
 [[nodiscard]] bool is_closed(const TriangleSoup& soup);
 
+/// The same triangles over points of which no two are equal; the others stay, unused. O(points).
+[[nodiscard]] TriangleSoup welded(const TriangleSoup& soup);
+
 /// The same surface with its topology made as good as it can be without moving a point.
 struct Ordered {
   TriangleSoup soup;
