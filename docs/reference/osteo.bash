@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface snapshot structures phantom list info series guide convert run prepare rehearse replay demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin curve snapshot structures phantom list info series guide convert run prepare rehearse replay demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -10,6 +10,11 @@ _osteo() {
     "threshold --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
+    "distance --region") COMPREPLY=($(compgen -W "box interior band " -- "$cur")); return ;;
+    "distance --method") COMPREPLY=($(compgen -W "exact swept thesis " -- "$cur")); return ;;
+    "voxelize --margin") COMPREPLY=($(compgen -W "exact thesis " -- "$cur")); return ;;
+    "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
+    "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
@@ -25,6 +30,15 @@ _osteo() {
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
+    mesh-info) flags="$flags --xml --describe --self-intersections" ;;
+    mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
+    compare) flags="$flags --xml --describe --iso" ;;
+    distance) flags="$flags --xml --describe --region --band-inside-mm --band-outside-mm --spacing-mm --resolution --margin-voxels --method --tree-ascend-n --breadth-first --bound-as-printed --structure --like --nearest-out" ;;
+    distance-at) flags="$flags --xml --describe" ;;
+    voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
+    tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
+    skin) flags="$flags --xml --describe --method --neighbours" ;;
+    curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --image" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --seed --labels-out" ;;

@@ -4,8 +4,8 @@
 
 namespace osteo {
 
-void bench_bone(const Context& context);    ///< resampling, surface, contact, removal
+void bench_bone(const Context& context);      ///< resampling, surface, contact, removal
 void bench_geometry(const Context& context);  ///< distances, voxels, tetrahedra, curves, masks, skins
-void bench_import(const Context& context);  ///< DICOM to a volume
+void bench_import(const Context& context);    ///< DICOM to a volume
 
 }  // namespace osteo

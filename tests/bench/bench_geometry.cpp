@@ -38,7 +38,9 @@ double cpu_seconds() {
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
-double wall_seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double wall_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 // The least of a few runs; long ones run once.
 template <class F>
@@ -129,7 +131,8 @@ Error error_of(const std::vector<double>& d, const std::vector<double>& truth, d
 
 template <class T>
 void write_raw(const fs::path& path, const std::vector<T>& values) {
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
 }
 
 struct Line {
@@ -164,11 +167,15 @@ void distance_tables(const Context& context, const fs::path& folder) {
   Context one = context;
   one.threads = 1;
   std::printf(
-      "### Distance maps of the inside\n\nVoxels inside and their six neighbours (the thesis' set, section 6.3.4), isotropic, the longest extent divided by "
-      "the resolution. CPU seconds on one thread, surface in to map out; ours with tree, voxels and sign included, the peers' with the list of points given "
+      "### Distance maps of the inside\n\nVoxels inside and their six neighbours (the thesis' set, section 6.3.4), isotropic, the longest "
+      "extent divided by "
+      "the resolution. CPU seconds on one thread, surface in to map out; ours with tree, voxels and sign included, the peers' with the "
+      "list of points given "
       "and, but for VTK's, without sign. Instruction set: %s.\n\n",
       std::string(simd_name()).c_str());
-  std::printf("| surface | resolution | voxels | ours | ours, 2 threads (wall) | thesis as printed | thesis corrected | breadth first | Embree + hint | CGAL AABB | thesis corrected / ours | Embree / ours | CGAL / ours | published 2006 |\n");
+  std::printf(
+      "| surface | resolution | voxels | ours | ours, 2 threads (wall) | thesis as printed | thesis corrected | breadth first | Embree + "
+      "hint | CGAL AABB | thesis corrected / ours | Embree / ours | CGAL / ours | published 2006 |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const std::map<std::string, std::array<double, 4>> published{{"bunny", {0.736, 6.107, 29.033, 82.341}},
                                                                {"gear", {0.144, 1.751, 9.228, 27.137}},
@@ -180,17 +187,21 @@ void distance_tables(const Context& context, const fs::path& folder) {
       const int resolution = std::array{30, 75, 135, 195}[r];
       const Frame f = frame_around(s.soup, resolution, 2);
       VoxelBits bits;
-      const double ours = cpu([&] {
-        const DistanceMapper m(s.soup, f, one);
-        bits = m.inside().dilated();
-        (void)m.map_of(bits, std::numeric_limits<double>::infinity(), one);
-      }, 5);
+      const double ours = cpu(
+          [&] {
+            const DistanceMapper m(s.soup, f, one);
+            bits = m.inside().dilated();
+            (void)m.map_of(bits, std::numeric_limits<double>::infinity(), one);
+          },
+          5);
       Context two = context;
       two.threads = 2;
-      const double ours2 = wall([&] {
-        const DistanceMapper m(s.soup, f, two);
-        (void)m.map_of(m.inside().dilated(), std::numeric_limits<double>::infinity(), two);
-      }, 5);
+      const double ours2 = wall(
+          [&] {
+            const DistanceMapper m(s.soup, f, two);
+            (void)m.map_of(m.inside().dilated(), std::numeric_limits<double>::infinity(), two);
+          },
+          5);
       const std::vector<Vec3> points = points_of(bits);
       const auto thesis = [&](bool breadth, bool printed) {
         return cpu([&] { (void)ThesisDistance(s.soup).distances_mm(points, {0, breadth, printed}); }, 1);
@@ -199,9 +210,9 @@ void distance_tables(const Context& context, const fs::path& folder) {
       const double embree = cpu([&] { (void)bench::by_embree(s.soup, points); }, 1);
       const double cgal = cpu([&] { (void)bench::by_cgal(s.soup, points); }, 1);
       const auto known = published.find(s.name);
-      std::printf("| %s | %d | %zu | %.4f | %.4f | %.3f | %.3f | %.3f | %.3f | %.3f | %.0f | %.0f | %.0f | %s |\n", s.name.c_str(), resolution, points.size(), ours, ours2,
-                  printed, corrected, breadth, embree, cgal, corrected / ours, embree / ours, cgal / ours,
-                  known == published.end() ? "" : format_number(known->second[r]).c_str());
+      std::printf("| %s | %d | %zu | %.4f | %.4f | %.3f | %.3f | %.3f | %.3f | %.3f | %.0f | %.0f | %.0f | %s |\n", s.name.c_str(),
+                  resolution, points.size(), ours, ours2, printed, corrected, breadth, embree, cgal, corrected / ours, embree / ours,
+                  cgal / ours, known == published.end() ? "" : format_number(known->second[r]).c_str());
       std::fflush(stdout);
     }
   }
@@ -216,7 +227,8 @@ void distance_tables(const Context& context, const fs::path& folder) {
   std::vector<double> truth;
   // The tree's own answers, themselves held against brute force in the tests, and here on a sample.
   double reference_off = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) truth.push_back(tree.closest(points[i], i > 0 ? static_cast<std::uint32_t>(i % 7) : 0).distance_mm);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    truth.push_back(tree.closest(points[i], i > 0 ? static_cast<std::uint32_t>(i % 7) : 0).distance_mm);
   for (std::size_t i = 0; i < points.size(); i += points.size() / 500) {
     double d = 1e300;
     for (const auto& t : s.soup.triangles) {
@@ -224,23 +236,30 @@ void distance_tables(const Context& context, const fs::path& folder) {
     }
     reference_off = std::max(reference_off, std::abs(d - truth[i]) / h);
   }
-  std::printf("\n### Time against error: %s at 195\n\nError in voxels against the nearest of all triangles in double precision (brute force on 500 points differs from the reference by at most %.1e).\n\n", s.name.c_str(), reference_off);
+  std::printf(
+      "\n### Time against error: %s at 195\n\nError in voxels against the nearest of all triangles in double precision (brute force on 500 "
+      "points differs from the reference by at most %.1e).\n\n",
+      s.name.c_str(), reference_off);
   std::printf("| method | CPU s | of ours | error max | rms | off by > 0.001 voxel | sign |\n|---|---|---|---|---|---|---|\n");
   double ours_s = 0;
   const auto row = [&](const std::string& name, double seconds, const std::vector<double>& d, const char* sign) {
     const Error e = error_of(d, truth, h);
-    std::printf("| %s | %.3f | %.2f | %.1e | %.1e | %.2g %% | %s |\n", name.c_str(), seconds, seconds / ours_s, e.max, e.rms, 100 * e.wrong, sign);
+    std::printf("| %s | %.3f | %.2f | %.1e | %.1e | %.2g %% | %s |\n", name.c_str(), seconds, seconds / ours_s, e.max, e.rms, 100 * e.wrong,
+                sign);
     std::fflush(stdout);
   };
   DistanceMap map;
-  ours_s = cpu([&] {
-    const DistanceMapper m(s.soup, f, one);
-    map = m.map_of(m.inside().dilated(), std::numeric_limits<double>::infinity(), one);
-  }, 5);
+  ours_s = cpu(
+      [&] {
+        const DistanceMapper m(s.soup, f, one);
+        map = m.map_of(m.inside().dilated(), std::numeric_limits<double>::infinity(), one);
+      },
+      5);
   const std::vector<double> ours_values = values_of(map, bits);
   row("ours, exact", ours_s, ours_values, "winding number");
   std::vector<double> d;
-  for (const auto& [name, o] : {std::pair{"thesis, as printed", ThesisDistanceOptions{0, false, true}}, std::pair{"thesis, corrected, depth first", ThesisDistanceOptions{0, false, false}},
+  for (const auto& [name, o] : {std::pair{"thesis, as printed", ThesisDistanceOptions{0, false, true}},
+                                std::pair{"thesis, corrected, depth first", ThesisDistanceOptions{0, false, false}},
                                 std::pair{"thesis, corrected, breadth first", ThesisDistanceOptions{0, true, false}}}) {
     const double t = cpu([&] { d = ThesisDistance(s.soup).distances_mm(points, o); }, 1);
     row(name, t, d, "none");
@@ -303,14 +322,18 @@ void distance_tables(const Context& context, const fs::path& folder) {
   for (const Line& l : python_peers(folder, "points")) {
     std::vector<double> v(fs::file_size(l.file) / 8);
     std::ifstream(l.file, std::ios::binary).read(reinterpret_cast<char*>(v.data()), static_cast<std::streamsize>(v.size() * 8));
-    const std::size_t every = points.size() / v.size();
+    const std::size_t every = (points.size() + v.size() - 1) / v.size();
     std::vector<double> all_values(points.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t i = 0; i < v.size() && i * every < all_values.size(); ++i) all_values[i * every] = v[i];
     row(l.name, l.seconds, all_values, l.name.find("libigl") == 0 ? "normals" : l.name.find("Open3D") == 0 ? "parity" : "none");
   }
 
-  std::printf("\n### Whole box and narrow band (3 voxels inside, 2 outside) at 195\n\nCPU seconds, one thread. Wrong signs: against the winding number, of voxels in the band.\n\n");
-  std::printf("| surface | ours, box | swept, box | swept / ours | ours, band | OpenVDB, band | OpenVDB / ours | OpenVDB max error (voxels) | OpenVDB wrong signs | ours wrong signs |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### Whole box and narrow band (3 voxels inside, 2 outside) at 195\n\nCPU seconds, one thread. Wrong signs: against the winding "
+      "number, of voxels in the band.\n\n");
+  std::printf(
+      "| surface | ours, box | swept, box | swept / ours | ours, band | OpenVDB, band | OpenVDB / ours | OpenVDB max error (voxels) | "
+      "OpenVDB wrong signs | ours wrong signs |\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& each : all) {
     const Frame g = frame_around(each.soup, 195, 2);
     const double box = cpu([&] { (void)DistanceMapper(each.soup, g, one).map({}, one); });
@@ -338,13 +361,16 @@ void distance_tables(const Context& context, const fs::path& folder) {
         }
       }
     }
-    std::printf("| %s | %.3f | %.2f | %.0f | %.4f | %.3f | %.1f | %.2g | %llu | %llu of %llu tried |\n", each.name.c_str(), box, sweep, sweep / box, ours_band, vdb, vdb / ours_band, worst,
-                static_cast<unsigned long long>(wrong), static_cast<unsigned long long>(own_wrong), static_cast<unsigned long long>(n / 997));
+    std::printf("| %s | %.3f | %.2f | %.0f | %.4f | %.3f | %.1f | %.2g | %llu | %llu of %llu tried |\n", each.name.c_str(), box, sweep,
+                sweep / box, ours_band, vdb, vdb / ours_band, worst, static_cast<unsigned long long>(wrong),
+                static_cast<unsigned long long>(own_wrong), static_cast<unsigned long long>(n / 997));
     std::fflush(stdout);
   }
 
-  std::printf("\n### The thesis' spatial coherence (Figures 54 to 56): %s at 135\n\nCPU seconds of the distances alone.\n\n| TREE_ASCEND_N | depth first, as printed | depth first, corrected | breadth first, as printed | breadth first, corrected |\n|---|---|---|---|---|\n",
-              all.size() > 2 ? all[2].name.c_str() : all[0].name.c_str());
+  std::printf(
+      "\n### The thesis' spatial coherence (Figures 54 to 56): %s at 135\n\nCPU seconds of the distances alone.\n\n| TREE_ASCEND_N | depth "
+      "first, as printed | depth first, corrected | breadth first, as printed | breadth first, corrected |\n|---|---|---|---|---|\n",
+      all.size() > 2 ? all[2].name.c_str() : all[0].name.c_str());
   const Subject& happy = all.size() > 2 ? all[2] : all[0];
   const Frame hf = frame_around(happy.soup, 135, 2);
   const std::vector<Vec3> hp = points_of(voxels_inside(happy.soup, hf).dilated());
@@ -352,7 +378,8 @@ void distance_tables(const Context& context, const fs::path& folder) {
   for (const int ascend : {-1, 0, 1, 2, 4, 8}) {
     std::printf("| %d |", ascend);
     for (const bool breadth : {false, true}) {
-      for (const bool printed : {true, false}) std::printf(" %.3f |", cpu([&] { (void)thesis.distances_mm(hp, {ascend, breadth, printed}); }, 1));
+      for (const bool printed : {true, false})
+        std::printf(" %.3f |", cpu([&] { (void)thesis.distances_mm(hp, {ascend, breadth, printed}); }, 1));
     }
     std::printf("\n");
   }
@@ -362,11 +389,17 @@ void tet_tables(const Context& context) {
   Context one = context;
   one.threads = 1;
   const auto all = subjects();
-  const std::map<std::string, std::array<double, 4>> published{
-      {"bunny", {0.153, 1.98, 10.139, 18.287}}, {"gear", {0.101, 1.132, 5.789, 9.961}}, {"happy", {0.057, 0.562, 2.7, 4.74}}, {"dragon", {0.083, 0.772, 3.57, 6.042}}};
+  const std::map<std::string, std::array<double, 4>> published{{"bunny", {0.153, 1.98, 10.139, 18.287}},
+                                                               {"gear", {0.101, 1.132, 5.789, 9.961}},
+                                                               {"happy", {0.057, 0.562, 2.7, 4.74}},
+                                                               {"dragon", {0.083, 0.772, 3.57, 6.042}}};
   // What memory allows: writing as many bytes, once.
-  std::printf("\n### Voxels to five tetrahedra each (the thesis' Table 2)\n\nSeconds on one thread, surface in to mesh out, conforming; writing the result's bytes once, for comparison.\n\n");
-  std::printf("| surface | resolution | tets | voxels | tets | together | 2 threads | fill of as many bytes | published 2006 | published / ours |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### Voxels to five tetrahedra each (the thesis' Table 2)\n\nSeconds on one thread, surface in to mesh out, conforming; writing "
+      "the result's bytes once, for comparison.\n\n");
+  std::printf(
+      "| surface | resolution | tets | voxels | tets | together | 2 threads | fill of as many bytes | published 2006 | published / ours "
+      "|\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& s : all) {
     for (std::size_t r = 0; r < 4; ++r) {
       const int resolution = std::array{30, 75, 135, 165}[r];
@@ -379,21 +412,27 @@ void tet_tables(const Context& context) {
       two.threads = 2;
       const double both = wall([&] { m = {}, m = grid_tets(voxels_inside(s.soup, f, two).dilated(), two); }, 5);
       const std::size_t bytes = m.tets.size() * 16 + m.points_mm.size() * 12;
-      const double fill = cpu([&] {
-        BigArray<std::uint64_t> a;
-        a.resize(bytes / 8);
-        std::fill(a.begin(), a.end(), 0x0102030405060708ULL);
-        asm volatile("" : : "r"(a.data()) : "memory");
-      }, 7);
+      const double fill = cpu(
+          [&] {
+            BigArray<std::uint64_t> a;
+            a.resize(bytes / 8);
+            std::fill(a.begin(), a.end(), 0x0102030405060708ULL);
+            asm volatile("" : : "r"(a.data()) : "memory");
+          },
+          7);
       const auto known = published.find(s.name);
-      std::printf("| %s | %d | %zu | %.4f | %.4f | %.4f | %.4f | %.4f | %s | %s |\n", s.name.c_str(), resolution, m.tets.size(), voxels, tets, voxels + tets, both, fill,
-                  known == published.end() ? "" : format_number(known->second[r]).c_str(),
+      std::printf("| %s | %d | %zu | %.4f | %.4f | %.4f | %.4f | %.4f | %s | %s |\n", s.name.c_str(), resolution, m.tets.size(), voxels,
+                  tets, voxels + tets, both, fill, known == published.end() ? "" : format_number(known->second[r]).c_str(),
                   known == published.end() ? "" : std::to_string(std::lround(known->second[r] / (voxels + tets))).c_str());
       std::fflush(stdout);
     }
   }
-  std::printf("\n### Tetrahedra of the four methods that follow the surface\n\nOne thread. Distances between boundary and surface in %% of the longest extent.\n\n");
-  std::printf("| surface | method | CPU s | tets | tets/s | dihedral min | max | aspect min | inverted | conforming | mean distance | max distance |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### Tetrahedra of the four methods that follow the surface\n\nOne thread. Distances between boundary and surface in %% of the "
+      "longest extent.\n\n");
+  std::printf(
+      "| surface | method | CPU s | tets | tets/s | dihedral min | max | aspect min | inverted | conforming | mean distance | max distance "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Subject& s : all) {
     const Frame f = frame_around(s.soup, 38, 0);
     const double h = f.spacing_mm.x;
@@ -409,8 +448,9 @@ void tet_tables(const Context& context) {
       const TetQuality q = tet_quality(m);
       const SurfaceComparison c = compare_surfaces(soup_of(boundary_of(m)), s.soup);
       const double extent = 38 * h;
-      std::printf("| %s | %s | %.3f | %zu | %.3g | %.2f | %.2f | %.3f | %llu | %s | %.3f | %.3f |\n", s.name.c_str(), name, seconds, m.tets.size(), static_cast<double>(m.tets.size()) / seconds,
-                  q.min_dihedral_deg, q.max_dihedral_deg, q.min_aspect, static_cast<unsigned long long>(q.inverted), q.conforming() ? "yes" : "no",
+      std::printf("| %s | %s | %.3f | %zu | %.3g | %.2f | %.2f | %.3f | %llu | %s | %.3f | %.3f |\n", s.name.c_str(), name, seconds,
+                  m.tets.size(), static_cast<double>(m.tets.size()) / seconds, q.min_dihedral_deg, q.max_dihedral_deg, q.min_aspect,
+                  static_cast<unsigned long long>(q.inverted), q.conforming() ? "yes" : "no",
                   100 * std::max(c.a_to_b.mean_mm, c.b_to_a.mean_mm) / extent, 100 * c.hausdorff_mm() / extent);
       std::fflush(stdout);
     };
@@ -424,8 +464,12 @@ void tet_tables(const Context& context) {
 }
 
 void curve_table() {
-  std::printf("\n### Nearest point of a curve\n\n20,000 positions along a curve that approaches itself, as a hand would move. Microseconds a question; build in seconds; off track: not on the stretch that the exact penalised minimum is on.\n\n");
-  std::printf("| points | ours mean | p99.9 | build | ours, penalty, mean | p99.9 | thesis on nanoflann (N = 100), penalty, mean | p99.9 | its off track | ratio of means |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### Nearest point of a curve\n\n20,000 positions along a curve that approaches itself, as a hand would move. Microseconds a "
+      "question; build in seconds; off track: not on the stretch that the exact penalised minimum is on.\n\n");
+  std::printf(
+      "| points | ours mean | p99.9 | build | ours, penalty, mean | p99.9 | thesis on nanoflann (N = 100), penalty, mean | p99.9 | its off "
+      "track | ratio of means |\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const int n : {2000, 20000, 200000, 2000000}) {
     std::vector<Vec3> points;
     for (int i = 0; i < n; ++i) {
@@ -473,8 +517,8 @@ void curve_table() {
       arc = c.arc_mm;
       if (std::abs(arc - arcs[at++]) > 30) ++off;
     });
-    std::printf("| %d | %.2f | %.2f | %.4f | %.2f | %.2f | %.1f | %.1f | %d of 20000 | %.0f |\n", n, plain.first, plain.second, build, held.first, held.second, theirs.first, theirs.second, off,
-                theirs.first / held.first);
+    std::printf("| %d | %.2f | %.2f | %.4f | %.2f | %.2f | %.1f | %.1f | %d of 20000 | %.0f |\n", n, plain.first, plain.second, build,
+                held.first, held.second, theirs.first, theirs.second, off, theirs.first / held.first);
     std::fflush(stdout);
   }
 }
@@ -486,16 +530,20 @@ void mask_table(const Context& context, const fs::path& folder) {
   std::vector<std::uint8_t> mask(f.voxel_count(), 0);
   std::mt19937 random(1);
   for (int b = 0; b < 60; ++b) {  // sixty balls
-    const int cx = static_cast<int>(random() % 512), cy = static_cast<int>(random() % 512), cz = static_cast<int>(random() % 300), r = 10 + static_cast<int>(random() % 40);
+    const int cx = static_cast<int>(random() % 512), cy = static_cast<int>(random() % 512), cz = static_cast<int>(random() % 300),
+              r = 10 + static_cast<int>(random() % 40);
     for (int k = std::max(0, cz - r); k < std::min(300, cz + r); ++k) {
       for (int j = std::max(0, cy - r); j < std::min(512, cy + r); ++j) {
         for (int i = std::max(0, cx - r); i < std::min(512, cx + r); ++i) {
-          if ((i - cx) * (i - cx) + (j - cy) * (j - cy) + (k - cz) * (k - cz) < r * r) mask[(static_cast<std::size_t>(k) * 512 + j) * 512 + i] = 1;
+          if ((i - cx) * (i - cx) + (j - cy) * (j - cy) + (k - cz) * (k - cz) < r * r)
+            mask[(static_cast<std::size_t>(k) * 512 + j) * 512 + i] = 1;
         }
       }
     }
   }
-  std::printf("\n### Euclidean distance of a mask, 512 x 512 x 300, anisotropic\n\nWall seconds. Ours gives squared distances to the mask; the stage's sparse map of a 3 mm band holds both sides.\n\n| method | s |\n|---|---|\n");
+  std::printf(
+      "\n### Euclidean distance of a mask, 512 x 512 x 300, anisotropic\n\nWall seconds. Ours gives squared distances to the mask; the "
+      "stage's sparse map of a 3 mm band holds both sides.\n\n| method | s |\n|---|---|\n");
   std::vector<float> d2;
   for (const int threads : {1, 2}) {
     Context c = context;
@@ -509,24 +557,36 @@ void mask_table(const Context& context, const fs::path& folder) {
   labels.voxels = voxels;
   SparseGrid sparse;
   const std::uint8_t value = 1;
-  std::printf("| ours, both sides to a sparse band, %d threads | %.2f |\n", 2, wall([&] { sparse = mask_distance(labels, {&value, 1}, {DistanceRegion::band, 3, 3}, context); }, 1));
+  std::printf("| ours, both sides to a sparse band, %d threads | %.2f |\n", 2,
+              wall(
+                  [&] {
+                    sparse = mask_distance(labels, {&value, 1}, {DistanceRegion::band, 3, 3}, context);
+                  },
+                  1));
   write_raw(folder / "mask.u8", mask);
   write_raw(folder / "shape.f64", std::vector<double>{512, 512, 300, 0.5, 0.5, 0.8});
   for (const Line& l : python_peers(folder, "mask")) std::printf("| %s | %.2f |\n", l.name.c_str(), l.seconds);
   if (fs::exists(folder / "edt.f32")) {
     std::vector<float> theirs(mask.size());
-    std::ifstream(folder / "edt.f32", std::ios::binary).read(reinterpret_cast<char*>(theirs.data()), static_cast<std::streamsize>(theirs.size() * 4));
+    std::ifstream(folder / "edt.f32", std::ios::binary)
+        .read(reinterpret_cast<char*>(theirs.data()), static_cast<std::streamsize>(theirs.size() * 4));
     double worst = 0;
-    for (std::size_t i = 0; i < theirs.size(); ++i) worst = std::max(worst, std::abs(std::sqrt(static_cast<double>(d2[i])) - static_cast<double>(theirs[i])));
-    std::printf("\nOurs and edt differ by at most %.1e mm. The sparse band takes %.0f MB, a dense float volume %.0f MB.\n", worst, static_cast<double>(sparse.memory_bytes) / 1e6, static_cast<double>(mask.size()) * 4 / 1e6);
+    for (std::size_t i = 0; i < theirs.size(); ++i)
+      worst = std::max(worst, std::abs(std::sqrt(static_cast<double>(d2[i])) - static_cast<double>(theirs[i])));
+    std::printf("\nOurs and edt differ by at most %.1e mm. The sparse band takes %.0f MB, a dense float volume %.0f MB.\n", worst,
+                static_cast<double>(sparse.memory_bytes) / 1e6, static_cast<double>(mask.size()) * 4 / 1e6);
   }
 }
 
 void skin_table(const Context& context) {
   const auto all = subjects();
   const Subject& s = all[0];
-  std::printf("\n### Skinning: %s (%zu points) on grid tetrahedra\n\nError of the moved points against the true map, in cubes; one thread.\n\n", s.name.c_str(), s.soup.points_mm.size());
-  std::printf("| resolution | tets | method | bind ms | move ms | stretch rms | max | shear rms | bend 60 degrees rms | max | rotation rms | max |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### Skinning: %s (%zu points) on grid tetrahedra\n\nError of the moved points against the true map, in cubes; one thread.\n\n",
+      s.name.c_str(), s.soup.points_mm.size());
+  std::printf(
+      "| resolution | tets | method | bind ms | move ms | stretch rms | max | shear rms | bend 60 degrees rms | max | rotation rms | max "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const TriMesh surface = mesh_of(s.soup);
   Context one = context;
   one.threads = 1;
@@ -568,8 +628,9 @@ void skin_table(const Context& context) {
         return std::pair{std::sqrt(sum / static_cast<double>(out.size())), worst};
       };
       const auto a = errors(stretch), b = errors(shear), c = errors(bend), r = errors(rotate);
-      std::printf("| %d | %zu | %s | %.1f | %.3f | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g |\n", resolution, rest.tets.size(), method == SkinMethod::embedded ? "embedded" : "frames (thesis)",
-                  bind * 1e3, move * 1e3, a.first, a.second, b.first, c.first, c.second, r.first, r.second);
+      std::printf("| %d | %zu | %s | %.1f | %.3f | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g | %.2g |\n", resolution, rest.tets.size(),
+                  method == SkinMethod::embedded ? "embedded" : "frames (thesis)", bind * 1e3, move * 1e3, a.first, a.second, b.first,
+                  c.first, c.second, r.first, r.second);
       std::fflush(stdout);
     }
   }
@@ -589,7 +650,8 @@ void live_table() {
   const Vec3 centre{40, 40, 40};
   for (int k = 0; k < 160; ++k)
     for (int j = 0; j < 160; ++j)
-      for (int i = 0; i < 160; ++i) bone.set(bone.find(i, j, k), static_cast<float>(std::clamp(0.5 + (30 - length(at(i, j, k) - centre)) / 0.5, 0.0, 1.0)));
+      for (int i = 0; i < 160; ++i)
+        bone.set(bone.find(i, j, k), static_cast<float>(std::clamp(0.5 + (30 - length(at(i, j, k) - centre)) / 0.5, 0.0, 1.0)));
   std::vector<SurfacePatch> patches(bone.brick_count());
   const auto triangles_of = [&](std::uint32_t b) {
     std::vector<std::array<Vec3, 3>> list;
@@ -638,7 +700,8 @@ void live_table() {
             if (left >= drilled.value(key)) continue;
             drilled.set(key, left);
             for (int c = 0; c < 8; ++c) {
-              const std::uint32_t b = drilled.find_brick((i + ((c & 1) != 0 ? 2 : -2)) >> 3, (j + ((c & 2) != 0 ? 2 : -2)) >> 3, (k + ((c & 4) != 0 ? 2 : -2)) >> 3);
+              const std::uint32_t b = drilled.find_brick((i + ((c & 1) != 0 ? 2 : -2)) >> 3, (j + ((c & 2) != 0 ? 2 : -2)) >> 3,
+                                                         (k + ((c & 4) != 0 ? 2 : -2)) >> 3);
               if (b != BrickGrid::kNone) dirty[b] = 1;
             }
           }
@@ -654,7 +717,9 @@ void live_table() {
         const auto after = triangles_of(b);
         own_ids[b].assign(after.size(), 0);
         std::map<std::array<double, 9>, std::uint32_t> known;
-        const auto key = [](const std::array<Vec3, 3>& t) { return std::array<double, 9>{t[0].x, t[0].y, t[0].z, t[1].x, t[1].y, t[1].z, t[2].x, t[2].y, t[2].z}; };
+        const auto key = [](const std::array<Vec3, 3>& t) {
+          return std::array<double, 9>{t[0].x, t[0].y, t[0].z, t[1].x, t[1].y, t[1].z, t[2].x, t[2].y, t[2].z};
+        };
         for (std::size_t i = 0; i < before.size(); ++i) known[key(before[i])] = old_ids[i];
         for (std::size_t i = 0; i < after.size(); ++i) {
           const auto it = known.find(key(after[i]));
@@ -679,10 +744,14 @@ void live_table() {
     patches = own_patches;
     std::sort(ms.begin(), ms.end());
     if (reach == 1.5) {
-      std::printf("\n### The map follows the drill\n\nA ball of bone, 160^3 voxels of 0.5 mm; a 3 mm burr moves 0.1 mm a step. One thread.\n\n| band | whole map s | update median ms | p95 ms | max ms | voxels measured a step | triangles taken / added a step |\n|---|---|---|---|---|---|---|\n");
+      std::printf(
+          "\n### The map follows the drill\n\nA ball of bone, 160^3 voxels of 0.5 mm; a 3 mm burr moves 0.1 mm a step. One thread.\n\n| "
+          "band | whole map s | update median ms | p95 ms | max ms | voxels measured a step | triangles taken / added a step "
+          "|\n|---|---|---|---|---|---|---|\n");
     }
-    std::printf("| %.1f mm | %.2f | %.3f | %.3f | %.3f | %llu | %llu / %llu |\n", reach, whole, ms[ms.size() / 2], ms[ms.size() * 95 / 100], ms.back(), static_cast<unsigned long long>(touched / ms.size()),
-                static_cast<unsigned long long>(removed_count / ms.size()), static_cast<unsigned long long>(added_count / ms.size()));
+    std::printf("| %.1f mm | %.2f | %.3f | %.3f | %.3f | %llu | %llu / %llu |\n", reach, whole, ms[ms.size() / 2], ms[ms.size() * 95 / 100],
+                ms.back(), static_cast<unsigned long long>(touched / ms.size()), static_cast<unsigned long long>(removed_count / ms.size()),
+                static_cast<unsigned long long>(added_count / ms.size()));
   }
 }
 

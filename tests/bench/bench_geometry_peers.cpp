@@ -18,7 +18,6 @@
 #include <nanoflann.hpp>
 #include <set>
 
-
 namespace osteo::bench {
 namespace {
 
@@ -97,8 +96,10 @@ std::vector<double> by_embree(const TriangleSoup& soup, std::span<const Vec3> po
   const RTCScene scene = rtcNewScene(device);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* const v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, soup.points_mm.size()));
-  auto* const t = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.triangles.size()));
+  auto* const v =
+      static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, soup.points_mm.size()));
+  auto* const t =
+      static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, soup.triangles.size()));
   for (std::size_t i = 0; i < soup.points_mm.size(); ++i) {
     for (std::size_t a = 0; a < 3; ++a) v[3 * i + a] = static_cast<float>(soup.points_mm[i][a]);
   }
@@ -190,7 +191,8 @@ std::vector<float> by_openvdb(const TriangleSoup& soup, const Frame& frame, doub
   for (const auto& t : soup.triangles) triangles.emplace_back(t[0], t[1], t[2]);
   openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> mesh(points, triangles);
   const auto inside = inside_voxels < 0 ? std::numeric_limits<float>::max() : static_cast<float>(inside_voxels);
-  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *openvdb::math::Transform::createLinearTransform(1.0), static_cast<float>(outside_voxels), inside);
+  const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *openvdb::math::Transform::createLinearTransform(1.0),
+                                                                     static_cast<float>(outside_voxels), inside);
   std::vector<float> d(frame.voxel_count(), std::numeric_limits<float>::quiet_NaN());
   for (auto v = grid->cbeginValueOn(); v; ++v) {
     const auto box = v.getBoundingBox();
@@ -228,7 +230,9 @@ NearestNeighbours::NearestNeighbours(std::span<const Vec3> points) : impl_(new I
   }
   impl_->tree = std::make_unique<Impl::Tree>(3, impl_->adaptor);
 }
-NearestNeighbours::~NearestNeighbours() { delete impl_; }
+NearestNeighbours::~NearestNeighbours() {
+  delete impl_;
+}
 
 CurvePoint NearestNeighbours::find(Vec3 p, double arc, double penalty, int n) const {
   std::uint32_t ids[1000];

@@ -50,7 +50,8 @@ TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options
   PMP::polygon_soup_to_polygon_mesh(points, triangles, mesh);
   const std::string advice = "try 'osteo mesh-repair' first, or the method grid-conforming, which takes any surface";
   if (!CGAL::is_closed(mesh)) throw Error(ExitCode::failed, "CGAL needs a closed surface; this one has openings", advice);
-  if (PMP::does_self_intersect(mesh)) throw Error(ExitCode::failed, "CGAL needs a surface that does not intersect itself; this one does", advice);
+  if (PMP::does_self_intersect(mesh))
+    throw Error(ExitCode::failed, "CGAL needs a surface that does not intersect itself; this one does", advice);
   context.progress(0.2, "refining");
   try {
     CGAL::get_default_random() = CGAL::Random(static_cast<unsigned>(context.seed));

@@ -46,7 +46,9 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
     const auto other = [&](const std::array<std::uint32_t, 3>& w, std::size_t skip) {
       std::vector<std::uint32_t> rest;
       for (const auto a : w) {
-        if (std::find(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(skip), a) == shared.begin() + static_cast<std::ptrdiff_t>(skip)) rest.push_back(a);
+        if (std::find(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(skip), a) ==
+            shared.begin() + static_cast<std::ptrdiff_t>(skip))
+          rest.push_back(a);
       }
       return rest;
     };
@@ -56,13 +58,14 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
     } else if (shared.size() == 1) {
       // Beyond the shared point: the opposite edge of one meets the other.
       const auto a = other(u, 1), b = other(v, 1);
-      hit = CGAL::do_intersect(K::Segment_3(points[a[0]], points[a[1]]), triangle(v)) || CGAL::do_intersect(K::Segment_3(points[b[0]], points[b[1]]), triangle(u));
+      hit = CGAL::do_intersect(K::Segment_3(points[a[0]], points[a[1]]), triangle(v)) ||
+            CGAL::do_intersect(K::Segment_3(points[b[0]], points[b[1]]), triangle(u));
     } else {
       // Folded onto each other: coplanar, and the two opposite corners on one side of the shared edge.
       const auto a = other(u, 2), b = other(v, 2);
       const auto &p = points[shared[0]], &q = points[shared[1]];
-      hit = CGAL::coplanar(p, q, points[a[0]], points[b[0]]) && !CGAL::collinear(p, q, points[a[0]]) && !CGAL::collinear(p, q, points[b[0]]) &&
-            CGAL::coplanar_orientation(p, q, points[a[0]], points[b[0]]) == CGAL::POSITIVE;
+      hit = CGAL::coplanar(p, q, points[a[0]], points[b[0]]) && !CGAL::collinear(p, q, points[a[0]]) &&
+            !CGAL::collinear(p, q, points[b[0]]) && CGAL::coplanar_orientation(p, q, points[a[0]], points[b[0]]) == CGAL::POSITIVE;
     }
     if (hit) found.emplace_back(used.source[s], used.source[t]);
   };

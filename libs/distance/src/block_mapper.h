@@ -12,7 +12,6 @@
 
 namespace osteo {
 
-
 inline constexpr int kBlock = 16;  // work is done in cubes of 16^3 voxels
 
 // One thread's memory. Grows to what the largest block needs and stays.
@@ -31,13 +30,19 @@ struct BlockScratch {
   std::array<std::uint32_t, kBlock * kBlock * kBlock> best_id;
 };
 
-inline std::size_t padded(std::size_t n) { return (n + 15) / 16 * 16; }
+inline std::size_t padded(std::size_t n) {
+  return (n + 15) / 16 * 16;
+}
 
 /// Hands lists of triangles down from cube to cube; see DistanceMapper.
 class BlockMapper {
  public:
   BlockMapper(const TriangleTree::Data& tree, const Frame& frame, BlockScratch& scratch)
-      : tree_(tree), kernel_(distance::kernel()), s_(scratch), origin_(tree.to_tree(frame.origin_mm)), step_(frame.spacing_mm / tree.unit_mm) {}
+      : tree_(tree),
+        kernel_(distance::kernel()),
+        s_(scratch),
+        origin_(tree.to_tree(frame.origin_mm)),
+        step_(frame.spacing_mm / tree.unit_mm) {}
 
   // Nearest triangles of the wanted voxels of the block at `lo`: wanted[16 * z + y] has bit x. Leaves them in scratch.
   // Voxels farther than `reach` (tree units) from everything may be left without. The tree is asked once for each cube of
@@ -70,11 +75,12 @@ class BlockMapper {
     hint = nearest.triangle;
     const Vec3 place = distance::place_on(tree_.exact[nearest.triangle], centre).point;
     const Vec3 g = normalized(centre - place);
-    const distance::Pivot pivot{static_cast<float>(std::sqrt(nearest.d2)), {static_cast<float>(g.x), static_cast<float>(g.y), static_cast<float>(g.z)}};
+    const distance::Pivot pivot{static_cast<float>(std::sqrt(nearest.d2)),
+                                {static_cast<float>(g.x), static_cast<float>(g.y), static_cast<float>(g.z)}};
     const float cf[3] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
     // The scratch outlives a map: another tree may have more packs.
     if (s_.packs.size() < tree_.view.triangles / 16 + 32) s_.packs.resize(tree_.view.triangles / 16 + 32);
-    const int packs = kernel_.collect(tree_.view, cf, half, pivot, s_.packs.data());
+    const int packs = kernel_.collect(tree_.view, cf, half, pivot, reach_, s_.packs.data());
     s_.ids.resize(static_cast<std::size_t>(packs) * 16);
     std::size_t count = 0;
     for (int p = 0; p < packs; ++p) {
@@ -87,7 +93,8 @@ class BlockMapper {
   [[nodiscard]] float half_of(int edge, std::size_t axis) const { return static_cast<float>((edge - 1) / 2.0 * step_[axis]) * 1.000001F; }
   [[nodiscard]] Vec3 centre_of(std::array<int, 3> at, int edge) const {
     const double h = (edge - 1) / 2.0;
-    return {origin_.x + (lo_[0] + at[0] + h) * step_.x, origin_.y + (lo_[1] + at[1] + h) * step_.y, origin_.z + (lo_[2] + at[2] + h) * step_.z};
+    return {origin_.x + (lo_[0] + at[0] + h) * step_.x, origin_.y + (lo_[1] + at[1] + h) * step_.y,
+            origin_.z + (lo_[2] + at[2] + h) * step_.z};
   }
   [[nodiscard]] bool any_wanted(std::array<int, 3> at, int edge) const {
     const auto mask = static_cast<std::uint16_t>(((1U << edge) - 1U) << at[0]);
@@ -114,13 +121,15 @@ class BlockMapper {
     task.ids = ids;
     task.count = static_cast<int>(count);
     task.margin = tree_.view.margin;
+    task.reach = reach_;
     task.wanted = 0;
     const std::size_t room = padded(count);
     if (s_.floats.size() < 20 * room) s_.floats.resize(20 * room);
     task.scratch = s_.floats.data();
     std::array<std::array<int, 3>, 8> place;
     for (unsigned k = 0; k < 8; ++k) {
-      place[k] = {at[0] + static_cast<int>(k & 1U) * child, at[1] + static_cast<int>(k >> 1 & 1U) * child, at[2] + static_cast<int>(k >> 2) * child};
+      place[k] = {at[0] + static_cast<int>(k & 1U) * child, at[1] + static_cast<int>(k >> 1 & 1U) * child,
+                  at[2] + static_cast<int>(k >> 2) * child};
       if (!any_wanted(place[k], child)) continue;
       task.wanted |= 1U << k;
       const Vec3 c = centre_of(place[k], child);
@@ -159,7 +168,9 @@ class BlockMapper {
     }
   }
 
-  [[nodiscard]] static std::uint32_t voxel_of(std::array<int, 3> at) { return static_cast<std::uint32_t>((at[2] * 16 + at[1]) * 16 + at[0]); }
+  [[nodiscard]] static std::uint32_t voxel_of(std::array<int, 3> at) {
+    return static_cast<std::uint32_t>((at[2] * 16 + at[1]) * 16 + at[0]);
+  }
 
   void measure_block(std::array<int, 3> at, int edge, const std::uint32_t* ids, std::size_t count) {
     std::array<double, kBlock * kBlock> x, y, z, d2;

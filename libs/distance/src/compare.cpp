@@ -15,7 +15,7 @@ namespace {
 
 struct Piece {
   Vec3 a, b, c;
-  double upper;  // no point of it is farther than this
+  double upper;         // no point of it is farther than this
   std::uint64_t order;  // ties
   friend bool operator<(const Piece& x, const Piece& y) { return x.upper != y.upper ? x.upper < y.upper : x.order > y.order; }
 };
@@ -145,8 +145,9 @@ StageInfo CompareStage::info() {
   return {.name = "compare",
           .version = 1,
           .synopsis = "how far apart two surfaces, grids or tetrahedral meshes are",
-          .description = "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum (Hausdorff) "
-                         "with a bound that it cannot exceed. Enclosed volumes. A grid stands for its isosurface, tetrahedra for their boundary.",
+          .description =
+              "Distances from each surface to the other: mean, RMS and 95th percentile over area, and the maximum (Hausdorff) "
+              "with a bound that it cannot exceed. Enclosed volumes. A grid stands for its isosurface, tetrahedra for their boundary.",
           .inputs = {{"a", {DataKind::surface, DataKind::tets, DataKind::grid}, "one surface"},
                      {"b", {DataKind::surface, DataKind::tets, DataKind::grid}, "the other"}},
           .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},

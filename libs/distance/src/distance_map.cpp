@@ -6,9 +6,9 @@
 #include <cmath>
 #include <memory>
 
+#include "block_mapper.h"
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
-#include "block_mapper.h"
 
 namespace osteo {
 namespace {
@@ -85,7 +85,8 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
       BlockResult& out = results[r];
       std::uint32_t hint = 0;  // each row for itself: the result must not depend on who did what before
       for (std::size_t bx = 0; bx < blocks(0); ++bx) {
-        const std::array<int, 3> lo{static_cast<int>(bx) * kBlock, static_cast<int>(r % blocks(1)) * kBlock, static_cast<int>(r / blocks(1)) * kBlock};
+        const std::array<int, 3> lo{static_cast<int>(bx) * kBlock, static_cast<int>(r % blocks(1)) * kBlock,
+                                    static_cast<int>(r / blocks(1)) * kBlock};
         // 16 divides 64: a block's bits lie in one word of each row.
         const auto read = [&](const VoxelBits& bits, int j, int k) {
           return static_cast<std::uint16_t>(bits.words[bits.row(j, k) + static_cast<std::size_t>(lo[0]) / 64] >> (lo[0] % 64));
@@ -120,7 +121,8 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
                 const std::size_t v = at * 16 + static_cast<std::size_t>(ox + x);
                 if (scratch->best_id[v] == kNone) continue;
                 const double d = std::sqrt(scratch->best_d2[v]) * tree.unit_mm;
-                if (d <= ((in[at] >> (ox + x) & 1U) != 0 ? inside_mm : outside_mm)) stored[static_cast<std::size_t>(z)] |= 1ULL << (x + 8 * y);
+                if (d <= ((in[at] >> (ox + x) & 1U) != 0 ? inside_mm : outside_mm))
+                  stored[static_cast<std::size_t>(z)] |= 1ULL << (x + 8 * y);
               }
             }
             some |= stored[static_cast<std::size_t>(z)];
@@ -167,8 +169,10 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
       const std::size_t b = order[o].second;
       map.bricks[o] = from.bricks[b];
       std::copy_n(from.stored.begin() + static_cast<std::ptrdiff_t>(b * 8), 8, map.stored.begin() + static_cast<std::ptrdiff_t>(o * 8));
-      std::copy_n(from.distance_mm.begin() + static_cast<std::ptrdiff_t>(b * 512), 512, map.distance_mm.begin() + static_cast<std::ptrdiff_t>(o * 512));
-      std::copy_n(from.triangle.begin() + static_cast<std::ptrdiff_t>(b * 512), 512, map.triangle.begin() + static_cast<std::ptrdiff_t>(o * 512));
+      std::copy_n(from.distance_mm.begin() + static_cast<std::ptrdiff_t>(b * 512), 512,
+                  map.distance_mm.begin() + static_cast<std::ptrdiff_t>(o * 512));
+      std::copy_n(from.triangle.begin() + static_cast<std::ptrdiff_t>(b * 512), 512,
+                  map.triangle.begin() + static_cast<std::ptrdiff_t>(o * 512));
     }
   });
   return map;

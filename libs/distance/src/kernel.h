@@ -49,10 +49,11 @@ struct FilterTask {
   const std::uint32_t* ids;  ///< readable up to the next multiple of 16
   int count;
   float centre[8][3];
-  unsigned wanted;     ///< bit k: child k
-  float half[3];       ///< half extents of a child's points
+  unsigned wanted;  ///< bit k: child k
+  float half[3];    ///< half extents of a child's points
   float margin;
-  float* scratch;      ///< 20 * (count rounded up to 16) floats
+  float reach;            ///< points farther than this from everything do not matter
+  float* scratch;         ///< 20 * (count rounded up to 16) floats
   std::uint32_t* out[8];  ///< room for count rounded up to 16
   int out_count[8];
   float lowest[8];  ///< lower bound on the distance at the child's centre
@@ -79,7 +80,8 @@ struct Kernel {
   /// sqrt(limit_d2); else triangle = 0xffffffff. visited: 3 KiB stack inside, no allocation.
   Nearest (*closest)(const TreeView&, const double point[3], std::uint32_t hint, double limit_d2);
   /// Packs that may hold the nearest triangle of some point of the box centre +- half, given a pivot.
-  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, std::uint32_t* packs);
+  /// Points farther than `reach` from everything do not matter.
+  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, float reach, std::uint32_t* packs);
 };
 
 extern const Kernel kScalar;

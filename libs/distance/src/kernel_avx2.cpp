@@ -45,16 +45,26 @@ struct D {
   friend D select(MaskD m, D a, D b) { return {_mm256_blendv_pd(b.v, a.v, m.m)}; }
 };
 
-inline MaskF both(MaskF a, MaskF b) { return {_mm256_and_ps(a.m, b.m)}; }
-inline MaskD both(MaskD a, MaskD b) { return {_mm256_and_pd(a.m, b.m)}; }
-inline unsigned bits(MaskF m) { return static_cast<unsigned>(_mm256_movemask_ps(m.m)); }
+inline MaskF both(MaskF a, MaskF b) {
+  return {_mm256_and_ps(a.m, b.m)};
+}
+inline MaskD both(MaskD a, MaskD b) {
+  return {_mm256_and_pd(a.m, b.m)};
+}
+inline unsigned bits(MaskF m) {
+  return static_cast<unsigned>(_mm256_movemask_ps(m.m));
+}
 inline F inverse_root(F a) {  // 12 bits and one step of Newton
   const F y{_mm256_rsqrt_ps(a.v)};
   const F half = F::all(0.5F) * a * y;
   return y * fnma(half, y, F::all(1.5F));
 }
-inline F root(F a) { return {_mm256_sqrt_ps(a.v)}; }
-inline F absolute(F a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)}; }
+inline F root(F a) {
+  return {_mm256_sqrt_ps(a.v)};
+}
+inline F absolute(F a) {
+  return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)};
+}
 inline float smallest(F a) {
   float v[8];
   a.store(v);
@@ -62,7 +72,9 @@ inline float smallest(F a) {
   for (int i = 1; i < 8; ++i) s = v[i] < s ? v[i] : s;
   return s;
 }
-inline unsigned tail(int left) { return left >= 8 ? 0xffU : (1U << left) - 1U; }
+inline unsigned tail(int left) {
+  return left >= 8 ? 0xffU : (1U << left) - 1U;
+}
 inline int compress(std::uint32_t* out, const std::uint32_t* ids, unsigned mask) {
   int n = 0;
   for (; mask != 0; mask &= mask - 1) out[n++] = ids[__builtin_ctz(mask)];

@@ -41,18 +41,32 @@ struct D {
   friend D select(__mmask8 m, D a, D b) { return {_mm512_mask_blend_pd(m, b.v, a.v)}; }
 };
 
-inline __mmask16 both(__mmask16 a, __mmask16 b) { return static_cast<__mmask16>(a & b); }
-inline __mmask8 both(__mmask8 a, __mmask8 b) { return static_cast<__mmask8>(a & b); }
-inline unsigned bits(__mmask16 m) { return m; }
+inline __mmask16 both(__mmask16 a, __mmask16 b) {
+  return static_cast<__mmask16>(a & b);
+}
+inline __mmask8 both(__mmask8 a, __mmask8 b) {
+  return static_cast<__mmask8>(a & b);
+}
+inline unsigned bits(__mmask16 m) {
+  return m;
+}
 inline F inverse_root(F a) {  // 14 bits and one step of Newton
   const F y{_mm512_rsqrt14_ps(a.v)};
   const F half = F::all(0.5F) * a * y;
   return y * fnma(half, y, F::all(1.5F));
 }
-inline F root(F a) { return {_mm512_sqrt_ps(a.v)}; }
-inline F absolute(F a) { return {_mm512_abs_ps(a.v)}; }
-inline float smallest(F a) { return _mm512_reduce_min_ps(a.v); }
-inline unsigned tail(int left) { return left >= 16 ? 0xffffU : (1U << left) - 1U; }
+inline F root(F a) {
+  return {_mm512_sqrt_ps(a.v)};
+}
+inline F absolute(F a) {
+  return {_mm512_abs_ps(a.v)};
+}
+inline float smallest(F a) {
+  return _mm512_reduce_min_ps(a.v);
+}
+inline unsigned tail(int left) {
+  return left >= 16 ? 0xffffU : (1U << left) - 1U;
+}
 inline int compress(std::uint32_t* out, const std::uint32_t* ids, unsigned mask) {
   const __m512i packed = _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), _mm512_loadu_si512(ids));
   _mm512_storeu_si512(out, packed);

@@ -140,11 +140,13 @@ void filter(FilterTask& task) {
       const float r = __builtin_sqrtf(r2);
       const F base = F::all(nearest + task.margin + r * 4e-6F);
       const F curve = F::all(nearest > 0 ? r2 / (2 * nearest) : 3e38F), most = F::all(2 * r);
+      const F limit = F::all(task.reach + r * 1.00001F + 2 * task.margin);
       const F hx = F::all(task.half[0]), hy = F::all(task.half[1]), hz = F::all(task.half[2]);
       const F ox = F::all(direction[0]), oy = F::all(direction[1]), oz = F::all(direction[2]);
       for (int i = 0; i < padded; i += kF) {
-        const F turn = fma(hx, absolute(F::load(sx + i) - ox), fma(hy, absolute(F::load(sy + i) - oy), fma(hz, absolute(F::load(sz + i) - oz), curve)));
-        const auto keep = at_most(F::load(sd + i), base + min(turn, most));
+        const F turn = fma(hx, absolute(F::load(sx + i) - ox),
+                           fma(hy, absolute(F::load(sy + i) - oy), fma(hz, absolute(F::load(sz + i) - oz), curve)));
+        const auto keep = at_most(F::load(sd + i), min(base + min(turn, most), limit));
         kept += compress(out + kept, task.ids + i, bits(keep) & tail(task.count - i));
       }
     }
@@ -155,7 +157,9 @@ void filter(FilterTask& task) {
 
 // --- double precision ------------------------------------------------------------------------------------------------
 
-inline D dot3(D ax, D ay, D az, D bx, D by, D bz) { return (ax * bx + ay * by) + az * bz; }
+inline D dot3(D ax, D ay, D az, D bx, D by, D bz) {
+  return (ax * bx + ay * by) + az * bz;
+}
 
 // Squared distance of p to the triangle in f[0..15] (the fields of ExactTriangle in order).
 inline D measure(const D* f, D px, D py, D pz) {
@@ -312,7 +316,7 @@ Nearest closest(const TreeView& tree, const double p[3], std::uint32_t hint, dou
   return best;
 }
 
-int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, std::uint32_t* packs) {
+int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, float reach, std::uint32_t* packs) {
   struct Entry {
     std::uint32_t group;
     int level;
@@ -327,7 +331,7 @@ int collect(const TreeView& tree, const float centre[3], const float half[3], co
   const F curve = F::all(m > 0 ? r2 / (2 * m) : 3e38F), most = F::all(2 * r);
   const F hx = F::all(half[0]), hy = F::all(half[1]), hz = F::all(half[2]);
   const F ox = F::all(pivot.direction[0]), oy = F::all(pivot.direction[1]), oz = F::all(pivot.direction[2]);
-  const F zero = F::all(0), tiny = F::all(1e-30F);
+  const F zero = F::all(0), tiny = F::all(1e-30F), limit = F::all(reach + r * 1.00001F + 2 * tree.margin);
   stack[top++] = {0, tree.levels - 1};
   while (top > 0) {
     const Entry e = stack[--top];
@@ -340,9 +344,10 @@ int collect(const TreeView& tree, const float centre[3], const float half[3], co
       const F dz = pz - min(max(pz, lz), F::load(g.hi[2] + i));
       const F d2 = max(fma(dx, dx, fma(dy, dy, dz * dz)), tiny);
       const F inverse = inverse_root(d2);
-      const F turn = fma(hx, absolute(fma(dx, inverse, zero - ox)), fma(hy, absolute(fma(dy, inverse, zero - oy)), fma(hz, absolute(fma(dz, inverse, zero - oz)), curve)));
+      const F turn = fma(hx, absolute(fma(dx, inverse, zero - ox)),
+                         fma(hy, absolute(fma(dy, inverse, zero - oy)), fma(hz, absolute(fma(dz, inverse, zero - oz)), curve)));
       // Empty boxes have lo > hi far away: their distance is huge.
-      keep |= bits(at_most(d2 * inverse, base + min(turn, most))) << i;
+      keep |= bits(at_most(d2 * inverse, min(base + min(turn, most), limit))) << i;
     }
     for (unsigned rest = keep; rest != 0; rest &= rest - 1) {
       const auto i = static_cast<std::uint32_t>(__builtin_ctz(rest));

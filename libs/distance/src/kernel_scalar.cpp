@@ -26,13 +26,27 @@ struct One {
 using F = One<float>;
 using D = One<double>;
 
-inline bool both(bool a, bool b) { return a && b; }
-inline unsigned bits(bool m) { return m ? 1U : 0U; }
-inline F root(F a) { return {__builtin_sqrtf(a.v)}; }
-inline F inverse_root(F a) { return {1 / __builtin_sqrtf(a.v)}; }
-inline F absolute(F a) { return {__builtin_fabsf(a.v)}; }
-inline float smallest(F a) { return a.v; }
-inline unsigned tail(int left) { return left > 0 ? 1U : 0U; }
+inline bool both(bool a, bool b) {
+  return a && b;
+}
+inline unsigned bits(bool m) {
+  return m ? 1U : 0U;
+}
+inline F root(F a) {
+  return {__builtin_sqrtf(a.v)};
+}
+inline F inverse_root(F a) {
+  return {1 / __builtin_sqrtf(a.v)};
+}
+inline F absolute(F a) {
+  return {__builtin_fabsf(a.v)};
+}
+inline float smallest(F a) {
+  return a.v;
+}
+inline unsigned tail(int left) {
+  return left > 0 ? 1U : 0U;
+}
 inline int compress(std::uint32_t* out, const std::uint32_t* ids, unsigned mask) {
   *out = *ids;
   return static_cast<int>(mask);

@@ -49,16 +49,18 @@ LiveDistance::Brick& LiveDistance::brick_for(int bi, int bj, int bk) {
 
 LiveDistance::Sample LiveDistance::at(int i, int j, int k) const {
   if (i < 0 || j < 0 || k < 0 || i >= frame_.dims[0] || j >= frame_.dims[1] || k >= frame_.dims[2]) return {};
-  const std::int32_t place = table_[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(j / 8)) *
-                                        static_cast<std::size_t>(cells_[0]) +
-                                    static_cast<std::size_t>(i / 8)];
+  const std::int32_t place =
+      table_[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(j / 8)) *
+                 static_cast<std::size_t>(cells_[0]) +
+             static_cast<std::size_t>(i / 8)];
   if (place < 0) return {};
   const Brick& b = bricks_[static_cast<std::size_t>(place)];
   const auto v = static_cast<std::size_t>((i & 7) + 8 * (j & 7) + 64 * (k & 7));
   return {b.distance_mm[v], b.triangle[v]};
 }
 
-std::uint32_t LiveDistance::update(std::span<const std::uint32_t> removed, std::span<const std::array<Vec3, 3>> added, const InsideAt& inside) {
+std::uint32_t LiveDistance::update(std::span<const std::uint32_t> removed, std::span<const std::array<Vec3, 3>> added,
+                                   const InsideAt& inside) {
   touched_ = 0;
   const auto first_added = static_cast<std::uint32_t>(triangles_.size());
   // The box, in voxels, of everything that changes.
@@ -79,7 +81,8 @@ std::uint32_t LiveDistance::update(std::span<const std::uint32_t> removed, std::
                     static_cast<std::size_t>(c[0])];
   };
   for (const std::uint32_t id : removed) {
-    if (id >= triangles_.size() || alive_[id] == 0) throw Error(ExitCode::usage, "there is no triangle " + std::to_string(id) + " to take away");
+    if (id >= triangles_.size() || alive_[id] == 0)
+      throw Error(ExitCode::usage, "there is no triangle " + std::to_string(id) + " to take away");
     alive_[id] = 0;
     auto& list = cell_list(triangles_[id]);
     list.erase(std::find(list.begin(), list.end(), id));
@@ -223,7 +226,8 @@ void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const V
             const std::uint32_t found = scratch->best_id[v];
             const double d = found == ClosestPoint::kNone ? 0 : std::sqrt(scratch->best_d2[v]) * data.unit_mm;
             const bool keep = found != ClosestPoint::kNone && d <= reach_mm_;
-            store(x + i, y + static_cast<int>(row & 15), z + static_cast<int>(row >> 4), d, keep ? id_of[data.original[found]] : ClosestPoint::kNone);
+            store(x + i, y + static_cast<int>(row & 15), z + static_cast<int>(row >> 4), d,
+                  keep ? id_of[data.original[found]] : ClosestPoint::kNone);
           }
         }
       }

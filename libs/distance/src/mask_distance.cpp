@@ -9,7 +9,8 @@
 
 namespace osteo {
 
-SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options, const Context& context) {
+SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options,
+                         const Context& context) {
   const Frame& f = labels.frame;
   std::array<std::uint8_t, 256> is{};
   for (const std::uint8_t v : wanted) is[v] = 1;
@@ -58,7 +59,8 @@ SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wan
     if (values[b].empty()) continue;
     bricks.push_back({static_cast<int>(b % bricks_along(0)), static_cast<int>(b / bricks_along(0) % bricks_along(1)),
                       static_cast<int>(b / bricks_along(0) / bricks_along(1))});
-    packed_bits.insert(packed_bits.end(), stored.begin() + static_cast<std::ptrdiff_t>(b * 8), stored.begin() + static_cast<std::ptrdiff_t>(b * 8 + 8));
+    packed_bits.insert(packed_bits.end(), stored.begin() + static_cast<std::ptrdiff_t>(b * 8),
+                       stored.begin() + static_cast<std::ptrdiff_t>(b * 8 + 8));
     packed.insert(packed.end(), values[b].begin(), values[b].end());
     farthest = std::max(farthest, *std::max_element(values[b].begin(), values[b].end()));
     values[b] = {};

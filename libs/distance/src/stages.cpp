@@ -39,7 +39,8 @@ void report_inside(const InsideReport& r, const Context& context) {
 }
 
 // Distances that another method found, in the form of the exact map.
-DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits& inside, const std::vector<double>& unsigned_mm, const DistanceMapOptions& o) {
+DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits& inside, const std::vector<double>& unsigned_mm,
+                   const DistanceMapOptions& o) {
   DistanceMap map;
   map.frame = frame;
   std::size_t at = 0;
@@ -49,13 +50,16 @@ DistanceMap as_map(const Frame& frame, const VoxelBits& wanted, const VoxelBits&
   for (int k = 0; k < frame.dims[2]; ++k) {
     for (int j = 0; j < frame.dims[1]; ++j) {
       row_first.push_back(at);
-      for (std::size_t w = 0; w < wanted.words_per_row; ++w) at += static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + w]));
+      for (std::size_t w = 0; w < wanted.words_per_row; ++w)
+        at += static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + w]));
     }
   }
   const auto number = [&](int i, int j, int k) {
     std::size_t n = row_first[static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)];
-    for (int w = 0; w < i / 64; ++w) n += static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(w)]));
-    return n + static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(i / 64)] & ((1ULL << (i % 64)) - 1)));
+    for (int w = 0; w < i / 64; ++w)
+      n += static_cast<std::size_t>(__builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(w)]));
+    return n + static_cast<std::size_t>(
+                   __builtin_popcountll(wanted.words[wanted.row(j, k) + static_cast<std::size_t>(i / 64)] & ((1ULL << (i % 64)) - 1)));
   };
   for (int bk = 0; bk < blocks(2); ++bk) {
     for (int bj = 0; bj < blocks(1); ++bj) {
@@ -110,7 +114,8 @@ std::vector<std::uint8_t> values_of(const Labels& labels, const std::string& wan
     int v = 0;
     const auto [end, problem] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), v);
     if (problem != std::errc() || end != wanted.data() + wanted.size() || v < 1 || v > 255) {
-      throw Error(ExitCode::usage, "there is no structure '" + wanted + "' in the labels", known.empty() ? "give its value, 1 to 255" : "there are: " + known);
+      throw Error(ExitCode::usage, "there is no structure '" + wanted + "' in the labels",
+                  known.empty() ? "give its value, 1 to 255" : "there are: " + known);
     }
     values.push_back(static_cast<std::uint8_t>(v));
   }
@@ -130,20 +135,22 @@ SparseGrid to_sparse(const DistanceMap& map) {
 }
 
 StageInfo DistanceStage::info() {
-  return {.name = "distance",
-          .version = 1,
-          .synopsis = "signed distance from voxels to a surface or to a structure",
-          .description = "Of a surface: the exact distance to its triangles, negative inside, in double precision, with the nearest triangle as a second "
-                         "grid when wanted. Inside is where the winding number says so: a whole number for closed surfaces, the generalized one for "
-                         "open ones; the report says which. Of labels: the exact Euclidean distance between voxel centres.",
-          .inputs = {{"subject", {DataKind::surface, DataKind::labels}, "surface, mask or label map"},
-                     {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
-          .outputs = {{"distance", {DataKind::grid}, "distance in mm, negative inside; far voxels are not stored"},
-                      {"nearest", {DataKind::grid}, "index of the nearest triangle in the same voxels", true}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3",
-                         "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013",
-                         "P. Felzenszwalb and D. Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012"},
-          .example = "osteo distance bone.ply distance.vdb --spacing-mm 0.5 --region band"};
+  return {
+      .name = "distance",
+      .version = 1,
+      .synopsis = "signed distance from voxels to a surface or to a structure",
+      .description =
+          "Of a surface: the exact distance to its triangles, negative inside, in double precision, with the nearest triangle as a second "
+          "grid when wanted. Inside is where the winding number says so: a whole number for closed surfaces, the generalized one for "
+          "open ones; the report says which. Of labels: the exact Euclidean distance between voxel centres.",
+      .inputs = {{"subject", {DataKind::surface, DataKind::labels}, "surface, mask or label map"},
+                 {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
+      .outputs = {{"distance", {DataKind::grid}, "distance in mm, negative inside; far voxels are not stored"},
+                  {"nearest", {DataKind::grid}, "index of the nearest triangle in the same voxels", true}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3",
+                     "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013",
+                     "P. Felzenszwalb and D. Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012"},
+      .example = "osteo distance bone.ply distance.vdb --spacing-mm 0.5 --region band"};
 }
 
 std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -196,7 +203,8 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
     }
     map = as_map(frame, wanted, inside, d, options);
   }
-  if (map.bricks.empty()) throw Error(ExitCode::failed, "no voxel lies in the region that gets distances", "choose smaller voxels or a wider band");
+  if (map.bricks.empty())
+    throw Error(ExitCode::failed, "no voxel lies in the region that gets distances", "choose smaller voxels or a wider band");
   double lo = 0, hi = 0;
   for (const double d : map.distance_mm) {
     if (d < lo) lo = d;
@@ -222,8 +230,9 @@ StageInfo DistanceAtStage::info() {
   return {.name = "distance-at",
           .version = 1,
           .synopsis = "signed distance and closest point at given points",
-          .description = "For each point of a text file (x, y, z in LPS mm a line; commas, blanks or tabs between) the exact distance to the surface, "
-                         "negative inside, the closest point and its triangle.",
+          .description =
+              "For each point of a text file (x, y, z in LPS mm a line; commas, blanks or tabs between) the exact distance to the surface, "
+              "negative inside, the closest point and its triangle.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}, {"points", {DataKind::source}, "text file of points"}},
           .outputs = {{"distances", {DataKind::document}, "one entry a point, in JSON"}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3"},
@@ -263,18 +272,20 @@ std::vector<Data> DistanceAtStage::run(const Params&, std::span<const Data> inpu
 }
 
 StageInfo VoxelizeStage::info() {
-  return {.name = "voxelize",
-          .version = 1,
-          .synopsis = "which voxels lie inside a surface",
-          .description = "Labels interior and border voxels; the rest is exterior. Counts crossings of rows of voxels in a way that never leaks at shared "
-                         "edges; open surfaces are decided by the generalized winding number. Self-intersecting, duplicated and inside-out triangles "
-                         "do no harm.",
-          .inputs = {{"surface", {DataKind::surface}, "triangles"},
-                     {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
-          .outputs = {{"labels", {DataKind::labels}, "1 interior, 2 border"}, {"grid", {DataKind::grid}, "the same, sparse", true}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2.2",
-                         "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013"},
-          .example = "osteo voxelize bone.ply voxels.seg.nrrd --resolution 195"};
+  return {
+      .name = "voxelize",
+      .version = 1,
+      .synopsis = "which voxels lie inside a surface",
+      .description =
+          "Labels interior and border voxels; the rest is exterior. Counts crossings of rows of voxels in a way that never leaks at shared "
+          "edges; open surfaces are decided by the generalized winding number. Self-intersecting, duplicated and inside-out triangles "
+          "do no harm.",
+      .inputs = {{"surface", {DataKind::surface}, "triangles"},
+                 {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
+      .outputs = {{"labels", {DataKind::labels}, "1 interior, 2 border"}, {"grid", {DataKind::grid}, "the same, sparse", true}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2.2",
+                     "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013"},
+      .example = "osteo voxelize bone.ply voxels.seg.nrrd --resolution 195"};
 }
 
 std::vector<Data> VoxelizeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -306,7 +317,8 @@ std::vector<Data> VoxelizeStage::run(const Params& p, std::span<const Data> inpu
     }
   }
   if (interior + border == 0) {
-    throw Error(ExitCode::failed, "no voxel's centre is inside the surface", "choose smaller voxels, or --margin thesis for plates thinner than a voxel");
+    throw Error(ExitCode::failed, "no voxel's centre is inside the surface",
+                "choose smaller voxels, or --margin thesis for plates thinner than a voxel");
   }
   labels.voxels = voxels;
   labels.structures = {{1, "interior", {230, 210, 170}}, {2, "border", {200, 90, 60}}};

@@ -42,7 +42,8 @@ std::vector<double> swept_distance_mm(const TriangleSoup& soup, const Frame& fra
   for (std::uint32_t t = 0; t < exact.size(); ++t) {
     std::array<int, 3> lo{}, hi{};
     for (std::size_t a = 0; a < 3; ++a) {
-      const double low = std::min({exact[t].a[a], exact[t].b[a], exact[t].c[a]}) / s[a], high = std::max({exact[t].a[a], exact[t].b[a], exact[t].c[a]}) / s[a];
+      const double low = std::min({exact[t].a[a], exact[t].b[a], exact[t].c[a]}) / s[a],
+                   high = std::max({exact[t].a[a], exact[t].b[a], exact[t].c[a]}) / s[a];
       lo[a] = static_cast<int>(std::clamp(std::floor(low) - 1, 0.0, n[a] - 1.0));
       hi[a] = static_cast<int>(std::clamp(std::ceil(high) + 1, 0.0, n[a] - 1.0));
     }

@@ -45,7 +45,8 @@ struct ThesisDistance::Tree {
     auto split = std::stable_partition(first, last, [&](std::uint32_t t) { return centre(t) < middle; });
     if (split == first || split == last) {
       split = first + (last - first) / 2;
-      std::nth_element(first, split, last, [&](std::uint32_t x, std::uint32_t y) { return std::make_pair(centre(x), x) < std::make_pair(centre(y), y); });
+      std::nth_element(first, split, last,
+                       [&](std::uint32_t x, std::uint32_t y) { return std::make_pair(centre(x), x) < std::make_pair(centre(y), y); });
     }
     const auto at = static_cast<std::size_t>(split - order.begin());
     const std::int32_t left = build(order, begin, at, id);
@@ -69,7 +70,8 @@ ThesisDistance::ThesisDistance(const TriangleSoup& soup) : tree_(std::make_uniqu
 
 ThesisDistance::~ThesisDistance() = default;
 
-std::vector<double> ThesisDistance::distances_mm(std::span<const Vec3> points, const ThesisDistanceOptions& options, const Context& context) const {
+std::vector<double> ThesisDistance::distances_mm(std::span<const Vec3> points, const ThesisDistanceOptions& options,
+                                                 const Context& context) const {
   std::vector<double> result;
   result.reserve(points.size());
   if (tree_->nodes.empty()) {

@@ -17,7 +17,7 @@ struct TriangleTree::Data {
   std::vector<std::uint32_t> rank;      ///< soup -> tree order
   Mat3 axes;                            ///< columns: the tree's axes in the world
   Vec3 centre_mm;
-  double area = 0;      ///< of all triangles, in units of the tree
+  double area = 0;     ///< of all triangles, in units of the tree
   double unit_mm = 1;  ///< a power of two: mm to one unit of the tree
 
   [[nodiscard]] Vec3 to_tree(Vec3 world_mm) const {

@@ -133,8 +133,22 @@ TriangleRecord make_record(const ExactTriangle& t, float margin) {
   const double inverse_sine2 = 1 / sine2, with_face = margin * inverse_sine2, height = lu * lv * std::sqrt(sine2) * iw;
   const bool face = sine2 > 1e-6 && with_face < height;
   const auto f = [](double x) { return static_cast<float>(x); };
-  return {f(a.x), f(a.y), f(a.z), f(u.x), f(u.y), f(u.z), f(v.x), f(v.y), f(v.z), f(lu), f(lv), f(lw), f(iw), f(cosine),
-          face ? f(inverse_sine2) : std::numeric_limits<float>::quiet_NaN(), f((face ? with_face : height) + edges) * 1.001F};
+  return {f(a.x),
+          f(a.y),
+          f(a.z),
+          f(u.x),
+          f(u.y),
+          f(u.z),
+          f(v.x),
+          f(v.y),
+          f(v.z),
+          f(lu),
+          f(lv),
+          f(lw),
+          f(iw),
+          f(cosine),
+          face ? f(inverse_sine2) : std::numeric_limits<float>::quiet_NaN(),
+          f((face ? with_face : height) + edges) * 1.001F};
 }
 
 // Into the tree's order: boxes of packs, then boxes of groups, up to one group.
@@ -218,7 +232,8 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   d.centre_mm = (lo + hi) * 0.5;
   const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   d.unit_mm = extent > 0 ? std::exp2(std::ceil(std::log2(extent)) - 7) : 1.0;  // the extent becomes 64 to 128 units
-  if (!(d.unit_mm > 0) || !std::isfinite(d.unit_mm)) throw Error(ExitCode::corrupt, "the surface's extent is not a number that can be worked with");
+  if (!(d.unit_mm > 0) || !std::isfinite(d.unit_mm))
+    throw Error(ExitCode::corrupt, "the surface's extent is not a number that can be worked with");
   std::vector<Vec3> points(soup.points_mm.size());
   parallel_for(points.size(), 8192, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) points[i] = d.to_tree(soup.points_mm[i]);
@@ -272,7 +287,9 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   data_ = std::move(made);
 }
 
-std::size_t TriangleTree::triangle_count() const { return data_ == nullptr ? 0 : data_->view.triangles; }
+std::size_t TriangleTree::triangle_count() const {
+  return data_ == nullptr ? 0 : data_->view.triangles;
+}
 
 std::size_t TriangleTree::memory_bytes() const {
   std::size_t sum = (triangle_count() + 15) / 16 * 16 * (sizeof(distance::TriangleRecord) + sizeof(distance::ExactTriangle)) +
@@ -309,6 +326,8 @@ ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   return {std::sqrt(d2), 0, place.feature, place.point + p};
 }
 
-std::string_view simd_name() { return distance::kernel().name; }
+std::string_view simd_name() {
+  return distance::kernel().name;
+}
 
 }  // namespace osteo

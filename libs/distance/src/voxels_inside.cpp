@@ -356,7 +356,8 @@ Frame frame_around_mm(const TriangleSoup& soup, double spacing_mm, int margin) {
   for (std::size_t a = 0; a < 3; ++a) {
     const double n = std::ceil((hi[a] - lo[a]) / spacing_mm - 1e-9);
     if (n > 100000) {
-      throw Error(ExitCode::usage, "voxels of " + format_number(spacing_mm) + " mm would make a grid of " + format_number(n) + " voxels along an axis",
+      throw Error(ExitCode::usage,
+                  "voxels of " + format_number(spacing_mm) + " mm would make a grid of " + format_number(n) + " voxels along an axis",
                   "choose larger voxels");
     }
     f.dims[a] = std::max(1, static_cast<int>(n)) + 2 * margin;

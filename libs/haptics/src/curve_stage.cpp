@@ -11,8 +11,10 @@ StageInfo CurveStage::info() {
   return {.name = "curve",
           .version = 1,
           .synopsis = "where a curve holds a moving hand, and with what force",
-          .description = "Runs the curve constraint over a path, point after point, as the haptic thread would: the place on the curve that minimises distance "
-                         "plus a penalty on the way from the last place, found exactly, and the spring's force.",
+          .description =
+              "Runs the curve constraint over a path, point after point, as the haptic thread would: the place on the curve that minimises "
+              "distance "
+              "plus a penalty on the way from the last place, found exactly, and the spring's force.",
           .inputs = {{"curve", {DataKind::source}, "text file of the curve's points in order"},
                      {"path", {DataKind::source}, "text file of the hand's positions in order"}},
           .outputs = {{"places", {DataKind::document}, "one entry a position, in JSON"}},

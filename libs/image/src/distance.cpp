@@ -61,7 +61,8 @@ void transform_line(float* f, int n, double h, Parabola* lower) {
 // Lines along a strided axis, a handful at a time: rows of memory are read whole, and turned into lines in the cache.
 constexpr std::size_t kTogether = 32;
 
-void transform_lines(float* f, std::size_t stride, int n, double h, std::size_t lines, std::vector<float>& turned, std::vector<Parabola>& lower) {
+void transform_lines(float* f, std::size_t stride, int n, double h, std::size_t lines, std::vector<float>& turned,
+                     std::vector<Parabola>& lower) {
   const auto length = static_cast<std::size_t>(n);
   turned.resize(length * kTogether);
   lower.resize(length);
@@ -102,7 +103,8 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
         transform_row(mask.data() + k * nx * ny + j * nx, value, slice + j * nx, frame.dims[0], frame.spacing_mm.x);
       }
       for (std::size_t s = 0; s < strips; ++s) {
-        transform_lines(slice + s * kTogether, nx, frame.dims[1], frame.spacing_mm.y, std::min(kTogether, nx - s * kTogether), turned, lower);
+        transform_lines(slice + s * kTogether, nx, frame.dims[1], frame.spacing_mm.y, std::min(kTogether, nx - s * kTogether), turned,
+                        lower);
       }
     }
   });
@@ -112,8 +114,8 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
     for (std::size_t j = begin; j < end; ++j) {
       context.check_cancelled();
       for (std::size_t s = 0; s < strips; ++s) {
-        transform_lines(d.data() + j * nx + s * kTogether, nx * ny, frame.dims[2], frame.spacing_mm.z, std::min(kTogether, nx - s * kTogether), turned,
-                        lower);
+        transform_lines(d.data() + j * nx + s * kTogether, nx * ny, frame.dims[2], frame.spacing_mm.z,
+                        std::min(kTogether, nx - s * kTogether), turned, lower);
       }
     }
   });

@@ -22,7 +22,9 @@ vtkSmartPointer<vtkPolyData> read_obj(const fs::path& path) {
   vtkNew<vtkCellArray> faces;
   std::vector<vtkIdType> face;
   std::size_t line = 0;
-  const auto fail = [&](const std::string& what) { return Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) + ": " + what); };
+  const auto fail = [&](const std::string& what) {
+    return Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) + ": " + what);
+  };
   for (std::size_t at = 0; at < text.size();) {
     std::size_t end = text.find('\n', at);
     if (end == std::string_view::npos) end = text.size();

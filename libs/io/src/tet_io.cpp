@@ -21,7 +21,9 @@
 namespace osteo {
 namespace {
 
-std::string suffix_of(const fs::path& path) { return lower_case(path.extension().string()); }
+std::string suffix_of(const fs::path& path) {
+  return lower_case(path.extension().string());
+}
 
 void turn_round(TetMesh& mesh) {
   for (auto& t : mesh.tets) {
@@ -64,7 +66,8 @@ class Lines {
       }
       at_ = end + 1;
     }
-    if (numbers.size() < wanted) throw fail("holds " + std::to_string(numbers.size()) + " numbers where " + what + " has " + std::to_string(wanted));
+    if (numbers.size() < wanted)
+      throw fail("holds " + std::to_string(numbers.size()) + " numbers where " + what + " has " + std::to_string(wanted));
     return numbers;
   }
   [[nodiscard]] Error fail(const std::string& what) const {
@@ -115,7 +118,8 @@ TetMesh load_tetgen(const fs::path& path) {
     std::array<std::uint32_t, 4> t{};
     for (std::size_t k = 0; k < 4; ++k) {
       const double id = v[k + 1] - first;
-      if (!(id >= 0) || id >= static_cast<double>(n) || id != std::floor(id)) throw cells.fail("there is no point " + format_number(v[k + 1]));
+      if (!(id >= 0) || id >= static_cast<double>(n) || id != std::floor(id))
+        throw cells.fail("there is no point " + format_number(v[k + 1]));
       t[k] = static_cast<std::uint32_t>(id);
     }
     mesh.tets.push_back(t);

@@ -134,7 +134,9 @@ CurvePoint Curve::on_segment(std::uint32_t segment, Vec3 p, double arc, double p
   const Vec3 direction = (b - a) / l;
   const double foot = dot(p - a, direction);
   const double height = length((p - a) - direction * foot);
-  const auto score = [&](double s) { return std::sqrt(height * height + (s - foot) * (s - foot)) + penalty * std::abs(arcs_[segment] + s - arc); };
+  const auto score = [&](double s) {
+    return std::sqrt(height * height + (s - foot) * (s - foot)) + penalty * std::abs(arcs_[segment] + s - arc);
+  };
   // The score is convex along the segment: its minimum is where distance grows as fast as the penalty falls, on either side of
   // where the constraint was, or there itself.
   double best = std::clamp(foot, 0.0, l);
@@ -170,7 +172,8 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
   CurvePoint best = on_segment(std::min(hint, last_segment), p, arc, penalty);
   const Vec3 q = p - centre_;
   const float pf[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
-  const double rounding = rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7 + penalty * (arc_rounding_ + std::abs(arc) * 2e-7);
+  const double rounding =
+      rounding_ + (std::abs(q.x) + std::abs(q.y) + std::abs(q.z)) * 4e-7 + penalty * (arc_rounding_ + std::abs(arc) * 2e-7);
   float reach = 0;
   const auto set_reach = [&] { reach = static_cast<float>(best.score_mm * (1 + 4e-7) + rounding); };
   set_reach();
@@ -216,7 +219,8 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
 CurvePoint Curve::at_arc(double arc) const {
   const double a = std::clamp(arc, 0.0, arcs_.back());
   auto it = std::upper_bound(arcs_.begin(), arcs_.end(), a);
-  const auto segment = static_cast<std::uint32_t>(std::clamp<std::ptrdiff_t>(it - arcs_.begin() - 1, 0, static_cast<std::ptrdiff_t>(points_.size()) - 2));
+  const auto segment =
+      static_cast<std::uint32_t>(std::clamp<std::ptrdiff_t>(it - arcs_.begin() - 1, 0, static_cast<std::ptrdiff_t>(points_.size()) - 2));
   CurvePoint r;
   r.segment = segment;
   const double l = arcs_[segment + 1] - arcs_[segment];

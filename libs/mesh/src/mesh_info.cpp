@@ -12,7 +12,9 @@
 namespace osteo {
 namespace {
 
-bool finite(const std::array<float, 3>& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
+bool finite(const std::array<float, 3>& p) {
+  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+}
 
 // The triangles that can be worked with.
 TriangleSoup sound_part(const TriMesh& mesh, std::uint64_t& bad_indices, std::uint64_t& non_finite) {
@@ -147,7 +149,8 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
   for (const auto& t : welded.triangles) {
     for (const auto v : t) corner[v] = 1;
   }
-  s.euler = std::count(corner.begin(), corner.end(), 1) - static_cast<std::int64_t>(edges.size()) + static_cast<std::int64_t>(welded.triangles.size());
+  s.euler = std::count(corner.begin(), corner.end(), 1) - static_cast<std::int64_t>(edges.size()) +
+            static_cast<std::int64_t>(welded.triangles.size());
   // Holes: connected sets of edges that one triangle has.
   std::map<std::uint32_t, std::uint32_t> parent;
   const auto root = [&](std::uint32_t i) {
@@ -167,7 +170,8 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
   const std::vector<std::uint32_t> body = bodies_of(as_given, count);
   s.bodies = count;
   std::vector<double> volume(count, 0);
-  for (std::size_t t = 0; t < body.size(); ++t) volume[body[t]] += signed_volume(as_given, as_given.triangles[t], (s.lo_mm + s.hi_mm) * 0.5);
+  for (std::size_t t = 0; t < body.size(); ++t)
+    volume[body[t]] += signed_volume(as_given, as_given.triangles[t], (s.lo_mm + s.hi_mm) * 0.5);
   if (s.watertight) {
     for (const double v : volume) {
       s.volume_mm3 += v;

@@ -47,11 +47,13 @@ TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Contex
     context.report("self_intersections_before", whole(c.self_intersections_before));
     context.report("self_intersections_after", whole(c.self_intersections_after));
     if (c.self_intersections_after > 0) {
-      context.warn(std::to_string(c.self_intersections_after) + " self-intersections are left; grid-conforming tetrahedra and distances do not mind");
+      context.warn(std::to_string(c.self_intersections_after) +
+                   " self-intersections are left; grid-conforming tetrahedra and distances do not mind");
     }
   }
 #else
-  if (p.max_hole_edges > 0 || p.self_intersections) context.warn("this build has no CGAL: holes and self-intersections are left as they are");
+  if (p.max_hole_edges > 0 || p.self_intersections)
+    context.warn("this build has no CGAL: holes and self-intersections are left as they are");
 #endif
   return soup;
 }
@@ -74,7 +76,8 @@ StageInfo MeshInfoStage::info() {
   return {.name = "mesh-info",
           .version = 1,
           .synopsis = "what a surface is like: closedness, bodies, holes, bad triangles",
-          .description = "Counts what can be wrong with a surface and what it measures. Takes any file that can be read, however bad the surface.",
+          .description =
+              "Counts what can be wrong with a surface and what it measures. Takes any file that can be read, however bad the surface.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"findings", {DataKind::document}, "the figures in JSON"}},
           .references = {},
@@ -139,9 +142,11 @@ StageInfo MeshRepairStage::info() {
   return {.name = "mesh-repair",
           .version = 1,
           .synopsis = "mends a surface: holes, duplicates, orientation, degenerate triangles, self-intersections",
-          .description = "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies agree on what is outside, "
-                         "closes holes, and cuts out self-intersections where that works. Holes and self-intersections need a build with CGAL. The "
-                         "report says what was done and what is left.",
+          .description =
+              "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies agree on what is "
+              "outside, "
+              "closes holes, and cuts out self-intersections where that works. Holes and self-intersections need a build with CGAL. The "
+              "report says what was done and what is left.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"repaired", {DataKind::surface}, "the mended surface"}},
           .references = {"P. Liepa, Filling Holes in Meshes, SGP 2003", "CGAL 5.5, Polygon Mesh Processing"},
@@ -160,19 +165,22 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
 }
 
 StageInfo TetrahedralizeStage::info() {
-  return {.name = "tetrahedralize",
-          .version = 1,
-          .synopsis = "tetrahedra that fill a surface",
-          .description =
-              "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; grid-conforming follows the surface with angles that "
-              "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself. Reports a quality table: angles, "
-              "aspect, volumes, conformity, and the distance of the boundary to the surface.",
-          .inputs = {{"surface", {DataKind::surface}, "triangles"}},
-          .outputs = {{"mesh", {DataKind::tets}, "tetrahedra (.vtu, or TetGen's .node and .ele)"}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2",
-                         "F. Labelle and J. Shewchuk, Isosurface Stuffing, SIGGRAPH 2007", "J. Maubach, Local bisection refinement, SISC 1995",
-                         "H. Si, TetGen, ACM TOMS 2015", "CGAL 5.5, 3D Mesh Generation"},
-          .example = "osteo tetrahedralize bone.ply bone.vtu --method grid-conforming --spacing-mm 2"};
+  return {
+      .name = "tetrahedralize",
+      .version = 1,
+      .synopsis = "tetrahedra that fill a surface",
+      .description =
+          "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; grid-conforming follows the surface "
+          "with angles that "
+          "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself. Reports a quality table: "
+          "angles, "
+          "aspect, volumes, conformity, and the distance of the boundary to the surface.",
+      .inputs = {{"surface", {DataKind::surface}, "triangles"}},
+      .outputs = {{"mesh", {DataKind::tets}, "tetrahedra (.vtu, or TetGen's .node and .ele)"}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.2",
+                     "F. Labelle and J. Shewchuk, Isosurface Stuffing, SIGGRAPH 2007", "J. Maubach, Local bisection refinement, SISC 1995",
+                     "H. Si, TetGen, ACM TOMS 2015", "CGAL 5.5, 3D Mesh Generation"},
+      .example = "osteo tetrahedralize bone.ply bone.vtu --method grid-conforming --spacing-mm 2"};
 }
 
 std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {

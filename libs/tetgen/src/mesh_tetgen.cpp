@@ -14,7 +14,8 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
   const Ordered used = ordered(surface, context);
   const std::string advice = "try 'osteo mesh-repair' first, or the method grid-conforming, which takes any surface";
   if (!used.open.empty()) {
-    throw Error(ExitCode::failed, "TetGen needs a closed surface; " + std::to_string(used.open.size()) + " edges of this one are open", advice);
+    throw Error(ExitCode::failed, "TetGen needs a closed surface; " + std::to_string(used.open.size()) + " edges of this one are open",
+                advice);
   }
   tetgenio in, out;
   in.firstnumber = 0;
@@ -42,17 +43,18 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
   try {
     tetrahedralize(switches.data(), &in, &out);
   } catch (const int code) {
-    const char* const reason = code == 1   ? "it ran out of memory"
-                               : code == 3 ? "the surface intersects itself"
-                               : code == 4 ? "features are smaller than its precision"
-                               : code == 5 ? "two triangles are nearly coplanar"
+    const char* const reason = code == 1    ? "it ran out of memory"
+                               : code == 3  ? "the surface intersects itself"
+                               : code == 4  ? "features are smaller than its precision"
+                               : code == 5  ? "two triangles are nearly coplanar"
                                : code == 10 ? "an input error"
                                             : "an internal error";
     throw Error(ExitCode::failed, std::string("TetGen failed: ") + reason + " (its code " + std::to_string(code) + ")", advice);
   }
   TetMesh mesh;
   for (int i = 0; i < out.numberofpoints; ++i) {
-    mesh.points_mm.push_back({static_cast<float>(out.pointlist[3 * i]), static_cast<float>(out.pointlist[3 * i + 1]), static_cast<float>(out.pointlist[3 * i + 2])});
+    mesh.points_mm.push_back({static_cast<float>(out.pointlist[3 * i]), static_cast<float>(out.pointlist[3 * i + 1]),
+                              static_cast<float>(out.pointlist[3 * i + 2])});
   }
   for (int i = 0; i < out.numberoftetrahedra; ++i) {
     const int* v = out.tetrahedronlist + static_cast<std::ptrdiff_t>(i) * out.numberofcorners;

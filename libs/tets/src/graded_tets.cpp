@@ -5,8 +5,8 @@
 #include <unordered_map>
 
 #include "osteo/base/error.h"
-#include "osteo/base/param.h"
 #include "osteo/base/parallel.h"
+#include "osteo/base/param.h"
 #include "osteo/distance/distance_map.h"
 
 namespace osteo {
@@ -93,7 +93,9 @@ TetMesh graded_tets(const TriangleSoup& surface, const GradedOptions& options, c
   const double coarse = options.spacing_mm * std::exp2(options.levels);
   Bisector mesh(frame_around_mm(surface, coarse, 1));
   const SignedDistance distance(surface, context);
-  const auto centre = [&](const Tet& t) { return (mesh.points[t.v[0]] + mesh.points[t.v[1]] + mesh.points[t.v[2]] + mesh.points[t.v[3]]) / 4; };
+  const auto centre = [&](const Tet& t) {
+    return (mesh.points[t.v[0]] + mesh.points[t.v[1]] + mesh.points[t.v[2]] + mesh.points[t.v[3]]) / 4;
+  };
   const auto reach = [&](const Tet& t, Vec3 c) {
     double r = 0;
     for (const auto v : t.v) r = std::max(r, length(mesh.points[v] - c));

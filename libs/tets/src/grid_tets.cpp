@@ -13,7 +13,9 @@ using FiveTets = std::array<std::array<std::uint8_t, 4>, 5>;
 constexpr FiveTets kEven{{{0, 3, 5, 6}, {1, 3, 5, 0}, {2, 0, 6, 3}, {4, 6, 0, 5}, {7, 5, 3, 6}}};
 constexpr FiveTets kOdd{{{1, 2, 7, 4}, {0, 1, 2, 4}, {3, 2, 1, 7}, {5, 1, 4, 7}, {6, 4, 2, 7}}};
 
-constexpr double corner(int c, int axis) { return c >> axis & 1; }
+constexpr double corner(int c, int axis) {
+  return c >> axis & 1;
+}
 constexpr FiveTets oriented(FiveTets tets, bool right_handed) {
   for (auto& t : tets) {
     double e[3][3] = {};
@@ -33,11 +35,14 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
   const int nx = voxels.frame.dims[0], ny = voxels.frame.dims[1], nz = voxels.frame.dims[2];
   // Which lattice corners are in use, a bit each.
   const std::size_t words = (static_cast<std::size_t>(nx) + 1 + 63) / 64;
-  const auto corner_row = [&](int j, int k) { return static_cast<std::size_t>(k) * static_cast<std::size_t>(ny + 1) + static_cast<std::size_t>(j); };
+  const auto corner_row = [&](int j, int k) {
+    return static_cast<std::size_t>(k) * static_cast<std::size_t>(ny + 1) + static_cast<std::size_t>(j);
+  };
   const std::size_t corner_rows = corner_row(0, nz + 1);
   BigArray<std::uint64_t> used;
   used.resize(corner_rows * words);
-  std::vector<std::uint64_t> first_point(corner_rows + 1, 0), first_voxel(static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz) + 1, 0);
+  std::vector<std::uint64_t> first_point(corner_rows + 1, 0),
+      first_voxel(static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz) + 1, 0);
   parallel_for(static_cast<std::size_t>(nz) + 1, 4, context.threads, [&](std::size_t begin, std::size_t end) {
     for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
       for (int j = 0; j <= ny; ++j) {
@@ -60,14 +65,16 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
       }
       for (int j = 0; j < ny && k < nz; ++j) {
         std::uint64_t count = 0;
-        for (std::size_t w = 0; w < voxels.words_per_row; ++w) count += static_cast<std::uint64_t>(std::popcount(voxels.words[voxels.row(j, k) + w]));
+        for (std::size_t w = 0; w < voxels.words_per_row; ++w)
+          count += static_cast<std::uint64_t>(std::popcount(voxels.words[voxels.row(j, k) + w]));
         first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j) + 1] = count;
       }
     }
   });
   for (std::size_t r = 1; r < first_point.size(); ++r) first_point[r] += first_point[r - 1];
   for (std::size_t r = 1; r < first_voxel.size(); ++r) first_voxel[r] += first_voxel[r - 1];
-  if (first_point.back() >= 0xffffffffULL) throw Error(ExitCode::resources, "the mesh would have more than 2^32 points", "choose larger voxels");
+  if (first_point.back() >= 0xffffffffULL)
+    throw Error(ExitCode::resources, "the mesh would have more than 2^32 points", "choose larger voxels");
   context.check_cancelled();
 
   TetMesh mesh;
@@ -91,7 +98,8 @@ TetMesh grid_tets(const VoxelBits& voxels, const Context& context) {
         }
       }
       for (int j = 0; j < ny && k < nz; ++j) {
-        std::array<std::uint32_t, 4>* out = mesh.tets.data() + 5 * first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)];
+        std::array<std::uint32_t, 4>* out =
+            mesh.tets.data() + 5 * first_voxel[static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)];
         const std::size_t rows[4] = {corner_row(j, k), corner_row(j + 1, k), corner_row(j, k + 1), corner_row(j + 1, k + 1)};
         std::uint32_t before[4];  // points of the row before this word
         for (int q = 0; q < 4; ++q) before[q] = static_cast<std::uint32_t>(first_point[rows[q]]);

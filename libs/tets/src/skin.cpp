@@ -11,7 +11,9 @@
 namespace osteo {
 namespace {
 
-Vec3 vec(const std::array<float, 3>& p) { return {p[0], p[1], p[2]}; }
+Vec3 vec(const std::array<float, 3>& p) {
+  return {p[0], p[1], p[2]};
+}
 
 // Cells of a uniform grid with the items that touch them, in order of items.
 class Cells {
@@ -57,7 +59,8 @@ class Cells {
 
  private:
   [[nodiscard]] std::size_t at(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(n_[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(n_[0]) + static_cast<std::size_t>(x);
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(n_[1]) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(n_[0]) +
+           static_cast<std::size_t>(x);
   }
   Vec3 lo_;
   double size_ = 1;
@@ -80,7 +83,8 @@ std::pair<Vec3, Vec3> bounds(const Points& points) {
 // Barycentric coordinates; false when the tetrahedron has no volume.
 bool barycentric(const TetMesh& mesh, std::uint32_t tet, Vec3 p, double w[4]) {
   const auto& t = mesh.tets[tet];
-  const Vec3 a = vec(mesh.points_mm[t[0]]), b = vec(mesh.points_mm[t[1]]) - a, c = vec(mesh.points_mm[t[2]]) - a, d = vec(mesh.points_mm[t[3]]) - a, q = p - a;
+  const Vec3 a = vec(mesh.points_mm[t[0]]), b = vec(mesh.points_mm[t[1]]) - a, c = vec(mesh.points_mm[t[2]]) - a,
+             d = vec(mesh.points_mm[t[3]]) - a, q = p - a;
   const double volume = dot(cross(b, c), d);
   if (!(volume > 0)) return false;
   w[1] = dot(cross(q, c), d) / volume;
@@ -264,15 +268,18 @@ void Skin::frame(const TriMesh& surface, const TetMesh& rest, int neighbours) {
       const auto [d2, i] = near[static_cast<std::size_t>(k)];
       const Vec3 offset = p - vec(boundary.points_mm[i]);
       const auto& e = axes_of[i];
-      votes_.push_back({i, static_cast<float>(1 / std::max(d2, least) / total),
-                        {static_cast<float>(dot(e[0], offset)), static_cast<float>(dot(e[1], offset)), static_cast<float>(dot(e[2], offset))}});
+      votes_.push_back(
+          {i,
+           static_cast<float>(1 / std::max(d2, least) / total),
+           {static_cast<float>(dot(e[0], offset)), static_cast<float>(dot(e[1], offset)), static_cast<float>(dot(e[2], offset))}});
     }
   }
 }
 
 void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::array<float, 3>> out) const {
   if (points.size() != mesh_points_ || out.size() != count_) {
-    throw Error(ExitCode::usage, "the moved mesh has " + std::to_string(points.size()) + " points; at rest it had " + std::to_string(mesh_points_));
+    throw Error(ExitCode::usage,
+                "the moved mesh has " + std::to_string(points.size()) + " points; at rest it had " + std::to_string(mesh_points_));
   }
   for (std::size_t i = 0; i < embeddings_.size(); ++i) {
     const Embedding& e = embeddings_[i];
@@ -288,8 +295,8 @@ void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::ar
     for (int k = 0; k < neighbours_; ++k) {
       const Vote& v = votes_[i * static_cast<std::size_t>(neighbours_) + static_cast<std::size_t>(k)];
       const auto& e = now[v.frame];
-      const Vec3 at = vec(points[frames_[v.frame].point]) + e[0] * static_cast<double>(v.offset[0]) + e[1] * static_cast<double>(v.offset[1]) +
-                      e[2] * static_cast<double>(v.offset[2]);
+      const Vec3 at = vec(points[frames_[v.frame].point]) + e[0] * static_cast<double>(v.offset[0]) +
+                      e[1] * static_cast<double>(v.offset[1]) + e[2] * static_cast<double>(v.offset[2]);
       p += at * static_cast<double>(v.weight);
     }
     out[i] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
@@ -297,16 +304,18 @@ void Skin::apply(std::span<const std::array<float, 3>> points, std::span<std::ar
 }
 
 StageInfo SkinStage::info() {
-  return {.name = "skin",
-          .version = 1,
-          .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
-          .description = "Binds the surface to the mesh at rest and moves it with the deformed mesh, which must have the same points in the same order.",
-          .inputs = {{"surface", {DataKind::surface}, "surface at rest"},
-                     {"rest", {DataKind::tets}, "mesh at rest"},
-                     {"deformed", {DataKind::tets}, "the same mesh, its points moved"}},
-          .outputs = {{"skinned", {DataKind::surface}, "the surface, moved"}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4.2"},
-          .example = "osteo skin bone.ply rest.vtu deformed.vtu moved.ply"};
+  return {
+      .name = "skin",
+      .version = 1,
+      .synopsis = "a surface that follows a tetrahedral mesh when it deforms",
+      .description =
+          "Binds the surface to the mesh at rest and moves it with the deformed mesh, which must have the same points in the same order.",
+      .inputs = {{"surface", {DataKind::surface}, "surface at rest"},
+                 {"rest", {DataKind::tets}, "mesh at rest"},
+                 {"deformed", {DataKind::tets}, "the same mesh, its points moved"}},
+      .outputs = {{"skinned", {DataKind::surface}, "the surface, moved"}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4.2"},
+      .example = "osteo skin bone.ply rest.vtu deformed.vtu moved.ply"};
 }
 
 std::vector<Data> SkinStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -319,7 +328,8 @@ std::vector<Data> SkinStage::run(const Params& p, std::span<const Data> inputs, 
   skin.apply({deformed.points_mm.data(), deformed.points_mm.size()}, moved.points_mm);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   double most = 0;
-  for (std::size_t i = 0; i < moved.points_mm.size(); ++i) most = std::max(most, length(vec(moved.points_mm[i]) - vec(surface.points_mm[i])));
+  for (std::size_t i = 0; i < moved.points_mm.size(); ++i)
+    most = std::max(most, length(vec(moved.points_mm[i]) - vec(surface.points_mm[i])));
   context.report("points", static_cast<std::int64_t>(moved.points_mm.size()));
   context.report("points_outside", static_cast<std::int64_t>(skin.outside()));
   context.report("largest_move_mm", most);

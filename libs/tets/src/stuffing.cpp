@@ -17,8 +17,8 @@ constexpr double kLong = 0.24999, kShort = 0.41189;
 
 // Lattice points have coordinates all even or all odd, in half spacings.
 struct Lattice {
-  Frame frame;                // at half the spacing
-  std::array<int, 3> n{};     // its dims
+  Frame frame;                        // at half the spacing
+  std::array<int, 3> n{};             // its dims
   std::array<std::size_t, 3> half{};  // points of either kind along each axis
   BigArray<float> value;              // signed distance in half spacings, capped at +-3; even points, then odd ones
   [[nodiscard]] std::size_t at(int x, int y, int z) const {
@@ -65,8 +65,20 @@ Lattice sample(const TriangleSoup& surface, double spacing_mm, const Context& co
   return lattice;
 }
 
-constexpr std::array<std::array<int, 3>, 14> kEdges{{{2, 0, 0}, {-2, 0, 0}, {0, 2, 0}, {0, -2, 0}, {0, 0, 2}, {0, 0, -2},
-                                                     {1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {-1, -1, 1}, {1, 1, -1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, -1}}};
+constexpr std::array<std::array<int, 3>, 14> kEdges{{{2, 0, 0},
+                                                     {-2, 0, 0},
+                                                     {0, 2, 0},
+                                                     {0, -2, 0},
+                                                     {0, 0, 2},
+                                                     {0, 0, -2},
+                                                     {1, 1, 1},
+                                                     {-1, 1, 1},
+                                                     {1, -1, 1},
+                                                     {-1, -1, 1},
+                                                     {1, 1, -1},
+                                                     {-1, 1, -1},
+                                                     {1, -1, -1},
+                                                     {-1, -1, -1}}};
 
 class Stuffer {
   static constexpr std::uint32_t kNone = 0xffffffffU;
@@ -207,7 +219,8 @@ class Stuffer {
     if (from_low[0] == from_low[1] && from_low[1] == from_low[2]) {
       // The diagonals run in a circle: only a point in the middle helps.
       Vec3 m;
-      for (const auto i : {a[0], a[1], a[2], b[0], b[1], b[2]}) m += Vec3{mesh_.points_mm[i][0], mesh_.points_mm[i][1], mesh_.points_mm[i][2]} / 6;
+      for (const auto i : {a[0], a[1], a[2], b[0], b[1], b[2]})
+        m += Vec3{mesh_.points_mm[i][0], mesh_.points_mm[i][1], mesh_.points_mm[i][2]} / 6;
       mesh_.points_mm.push_back({static_cast<float>(m.x), static_cast<float>(m.y), static_cast<float>(m.z)});
       const auto c = static_cast<std::uint32_t>(mesh_.points_mm.size() - 1);
       emit(a[0], a[1], a[2], c);
@@ -319,7 +332,8 @@ TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options
   Lattice lattice = sample(surface, options.spacing_mm, context);
   TetMesh mesh = Stuffer(lattice, context).run();
   if (mesh.tets.empty()) {
-    throw Error(ExitCode::failed, "no point of the lattice is inside the surface at a spacing of " + format_number(options.spacing_mm) + " mm",
+    throw Error(ExitCode::failed,
+                "no point of the lattice is inside the surface at a spacing of " + format_number(options.spacing_mm) + " mm",
                 "choose a smaller spacing");
   }
   if (options.target_dihedral_deg > 0) improve_tets(mesh, surface, options.target_dihedral_deg, options.spacing_mm, context.sub(0.9, 1.0));

@@ -19,7 +19,8 @@ using test::box, test::joined, test::moved, test::sphere, test::turned;
 
 double brute_force(const TriangleSoup& s, Vec3 p) {
   double d = 1e300;
-  for (const auto& t : s.triangles) d = std::min(d, closest_on_triangle(p, s.points_mm[t[0]], s.points_mm[t[1]], s.points_mm[t[2]]).distance_mm);
+  for (const auto& t : s.triangles)
+    d = std::min(d, closest_on_triangle(p, s.points_mm[t[0]], s.points_mm[t[1]], s.points_mm[t[2]]).distance_mm);
   return d;
 }
 
@@ -80,7 +81,8 @@ Worst compare(const DistanceMap& map, const TriangleSoup& soup, const TriangleSo
       if (expected > 1e-6 * voxel && (d < 0) != (std::abs(winding_number(truth, p)) > 0.5)) ++w.wrong_sign;
       // The triangle named is a nearest one.
       const auto& t = soup.triangles[map.triangle[b * 512 + v]];
-      EXPECT_NEAR(closest_on_triangle(p, soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]]).distance_mm, expected, 1e-9 * voxel);
+      EXPECT_NEAR(closest_on_triangle(p, soup.points_mm[t[0]], soup.points_mm[t[1]], soup.points_mm[t[2]]).distance_mm, expected,
+                  1e-9 * voxel);
       ++w.compared;
     }
   }
@@ -95,11 +97,20 @@ TEST(PointTriangle, AgreesWithLongDoubleOnAllKindsOfTriangles) {
     Vec3 a{u(random), u(random), u(random)}, b{u(random), u(random), u(random)}, c{u(random), u(random), u(random)};
     const Vec3 p{2 * u(random), 2 * u(random), 2 * u(random)};
     switch (i % 8) {
-      case 1: c = a + (b - a) * 0.3 + Vec3{0, 0, 1e-5}; break;         // cap
-      case 2: c = b + Vec3{1e-6, 2e-6, 0}; break;                      // needle
-      case 3: c = a + (b - a) * 0.5 + Vec3{u(random), u(random), u(random)} * 1e-9; break;  // nearly a segment
-      case 4: b = a + Vec3{1e-3, 0, 0}, c = a + Vec3{0, 1e-3, 0}; break;
-      default: break;
+      case 1:
+        c = a + (b - a) * 0.3 + Vec3{0, 0, 1e-5};
+        break;  // cap
+      case 2:
+        c = b + Vec3{1e-6, 2e-6, 0};
+        break;  // needle
+      case 3:
+        c = a + (b - a) * 0.5 + Vec3{u(random), u(random), u(random)} * 1e-9;
+        break;  // nearly a segment
+      case 4:
+        b = a + Vec3{1e-3, 0, 0}, c = a + Vec3{0, 1e-3, 0};
+        break;
+      default:
+        break;
     }
     const double d = closest_on_triangle(p, a, b, c).distance_mm;
     const auto r = static_cast<double>(reference(p, a, b, c));
@@ -159,7 +170,8 @@ TEST(DistanceMap, IsExactAndSignedOnHardCases) {
   TriangleSoup duplicated = ball;
   for (std::size_t i = 0; i < ball.triangles.size(); i += 10) duplicated.triangles.push_back(ball.triangles[i]);
   TriangleSoup reversed = ball;
-  for (std::size_t i = 0; i < ball.triangles.size(); i += 10) reversed.triangles.push_back({ball.triangles[i][0], ball.triangles[i][2], ball.triangles[i][1]});
+  for (std::size_t i = 0; i < ball.triangles.size(); i += 10)
+    reversed.triangles.push_back({ball.triangles[i][0], ball.triangles[i][2], ball.triangles[i][1]});
   TriangleSoup flipped = ball;
   for (std::size_t i = 0; i < ball.triangles.size(); i += 5) std::swap(flipped.triangles[i][0], flipped.triangles[i][1]);
   TriangleSoup needles = ball;
@@ -193,7 +205,8 @@ TEST(DistanceMap, IsExactAndSignedOnHardCases) {
       {"cavity", joined(ball, turned(sphere(6, 2))), joined(ball, turned(sphere(6, 2)))},
       {"nested shells, both out", joined(ball, sphere(6, 2)), joined(ball, sphere(6, 2))},
       {"touching boxes", joined(box({0, 0, 0}, {5, 10, 10}), box({5, 0, 0}, {10, 10, 10})), box({0, 0, 0}, {10, 10, 10})},
-      {"boxes that share an edge", joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10})), joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10}))},
+      {"boxes that share an edge", joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10})),
+       joined(box({0, 0, 0}, {5, 5, 10}), box({5, 5, 0}, {10, 10, 10}))},
       {"far away", moved(ball, 1, {1e6, -1e6, 1e6}), moved(ball, 1, {1e6, -1e6, 1e6})},
       {"tiny", moved(ball, 1e-6, {}), moved(ball, 1e-6, {})},
       {"very tiny", moved(ball, 1e-10, {}), moved(ball, 1e-10, {})},
@@ -356,7 +369,8 @@ TEST(VoxelsInside, NeverLeaksWhereRowsMeetCornersAndEdges) {
 TEST(SignedDistance, AgreesWithTheWindingNumber) {
   TriangleSoup open = sphere(10, 3);
   open.triangles.resize(open.triangles.size() * 4 / 5);
-  const TriangleSoup cases[] = {sphere(10, 3), open, joined(sphere(10, 3), turned(sphere(5, 2))), turned(sphere(10, 2)), test::unwelded(box({-6, -6, -6}, {7, 8, 9}))};
+  const TriangleSoup cases[] = {sphere(10, 3), open, joined(sphere(10, 3), turned(sphere(5, 2))), turned(sphere(10, 2)),
+                                test::unwelded(box({-6, -6, -6}, {7, 8, 9}))};
   std::mt19937 random(11);
   std::uniform_real_distribution<double> u(-13, 13);
   for (const TriangleSoup& s : cases) {
@@ -365,7 +379,7 @@ TEST(SignedDistance, AgreesWithTheWindingNumber) {
       const Vec3 p{u(random), u(random), u(random)};
       const double w = std::abs(winding_number(s, p));
       if (std::abs(w - 0.5) < 1e-9) continue;
-      EXPECT_EQ(d.at(p).signed_mm < 0, w > 0.5) << w;
+      EXPECT_EQ(d.at(p).signed_mm<0, w> 0.5) << w;
     }
   }
   EXPECT_TRUE(SignedDistance(cases[0]).closed());
@@ -431,7 +445,8 @@ TEST(RealMeshes, ExactAndSigned) {
     ASSERT_EQ(map.count(), f.voxel_count());
     const Ordered o = ordered(s);
     for (int n = 0; n < 60; ++n) {
-      const int i = static_cast<int>(random() % f.dims[0]), j = static_cast<int>(random() % f.dims[1]), k = static_cast<int>(random() % f.dims[2]);
+      const int i = static_cast<int>(random() % f.dims[0]), j = static_cast<int>(random() % f.dims[1]),
+                k = static_cast<int>(random() % f.dims[2]);
       const Vec3 p = f.world_from_index({double(i), double(j), double(k)});
       const std::int64_t at = map.find(i, j, k);
       const double expected = brute_force(s, p);

@@ -15,7 +15,9 @@ double brute_score(const std::vector<Vec3>& points, Vec3 p, double arc, double p
   double best = 1e300, at = 0;
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     const double l = length(points[i + 1] - points[i]);
-    const auto score = [&](double t) { return length(points[i] + (points[i + 1] - points[i]) * t - p) + penalty * std::abs(at + t * l - arc); };
+    const auto score = [&](double t) {
+      return length(points[i] + (points[i + 1] - points[i]) * t - p) + penalty * std::abs(at + t * l - arc);
+    };
     double lo = 0, hi = 1;
     for (int k = 0; k < 60; ++k) {  // convex in t
       const double a = lo + (hi - lo) / 3, b = hi - (hi - lo) / 3;
@@ -108,7 +110,7 @@ TEST(Curve, TracksThroughNearMisses) {
     arc = c.arc_mm;
     segment = c.segment;
   }
-  EXPECT_LT(worst, 3);                                    // a turn is 125 mm long
+  EXPECT_LT(worst, 3);  // a turn is 125 mm long
   EXPECT_NEAR(arc, curve.length_mm(), 5);
 }
 

@@ -22,13 +22,13 @@ TEST(MeshInfo, OfASphere) {
 
 TEST(MeshInfo, CountsWhatIsWrong) {
   TriMesh m = mesh_of(joined(sphere(10, 2), turned(box({20, 0, 0}, {25, 5, 5}))));
-  m.triangles.push_back(m.triangles[0]);                     // duplicate
-  m.triangles.push_back({1, 1, 2});                          // degenerate
+  m.triangles.push_back(m.triangles[0]);  // duplicate
+  m.triangles.push_back({1, 1, 2});       // degenerate
   m.points_mm.push_back({NAN, 0, 0});
   m.triangles.push_back({0, 1, static_cast<std::uint32_t>(m.points_mm.size() - 1)});
   m.triangles.push_back({0, 1, 99999});
-  m.points_mm.push_back({500, 500, 500});                    // unused
-  m.triangles.erase(m.triangles.begin() + 40);               // a hole
+  m.points_mm.push_back({500, 500, 500});       // unused
+  m.triangles.erase(m.triangles.begin() + 40);  // a hole
   const MeshSummary s = summarize(m);
   EXPECT_EQ(s.duplicates, 1U);
   EXPECT_EQ(s.degenerate, 1U);
@@ -67,7 +67,8 @@ TEST(Repair, MakesASoupASolid) {
 
 TEST(Repair, TurnsBodiesButLeavesCavities) {
   RepairReport r;
-  const TriMesh m = mesh_of(repaired(mesh_of(joined(joined(sphere(10, 2), turned(sphere(5, 2))), turned(box({20, 0, 0}, {25, 5, 5})))), {}, r));
+  const TriMesh m =
+      mesh_of(repaired(mesh_of(joined(joined(sphere(10, 2), turned(sphere(5, 2))), turned(box({20, 0, 0}, {25, 5, 5})))), {}, r));
   EXPECT_EQ(r.turned_bodies, 1U);
   const double shell = 4 / 3.0 * std::numbers::pi * (1000 - 125);
   EXPECT_NEAR(enclosed_volume_mm3(m), shell + 125, 0.05 * shell);

@@ -60,7 +60,8 @@ TEST(Quality, SeesCrossedDiagonals) {
   for (int c = 0; c < 2; ++c) {
     std::array<std::uint32_t, 8> v{};
     for (std::uint32_t n = 0; n < 8; ++n) v[n] = c + (n & 1) + 3 * (n >> 1 & 1) + 6 * (n >> 2);
-    for (const auto& t : {std::array{0, 3, 5, 6}, std::array{1, 3, 5, 0}, std::array{2, 0, 6, 3}, std::array{4, 6, 0, 5}, std::array{7, 5, 3, 6}}) {
+    for (const auto& t :
+         {std::array{0, 3, 5, 6}, std::array{1, 3, 5, 0}, std::array{2, 0, 6, 3}, std::array{4, 6, 0, 5}, std::array{7, 5, 3, 6}}) {
       std::array<std::uint32_t, 4> tet{v[t[0]], v[t[1]], v[t[2]], v[t[3]]};
       m.tets.push_back(tet);
       TetMesh one;
@@ -112,14 +113,15 @@ TEST(GridTets, RowsLongerThanAWordAndLeftHandedFrames) {
 TEST(Stuffing, GoodAnglesOnTheSurfaceWhateverTheSurface) {
   TriangleSoup open = sphere(10, 3);
   open.triangles.resize(open.triangles.size() * 9 / 10);
-  const std::pair<const char*, TriangleSoup> cases[] = {{"sphere", sphere(10, 4)},
-                                                        {"box", box({0, 0, 0}, {20, 13, 7})},
-                                                        {"cavity", joined(sphere(10, 3), turned(sphere(6, 3)))},
-                                                        {"intersecting", joined(sphere(10, 3), sphere(8, 3, {9, 1, 0}))},
-                                                        {"open", open},
-                                                        {"inside out", turned(sphere(10, 3))},
-                                                        {"far away", moved(sphere(10, 3), 1, {1000, -1000, 500})},
-                                                        {"touching boxes", joined(box({0, 0, 0}, {5, 10, 10}), box({5, 0, 0}, {10, 10, 10}))}};
+  const std::pair<const char*, TriangleSoup> cases[] = {
+      {"sphere", sphere(10, 4)},
+      {"box", box({0, 0, 0}, {20, 13, 7})},
+      {"cavity", joined(sphere(10, 3), turned(sphere(6, 3)))},
+      {"intersecting", joined(sphere(10, 3), sphere(8, 3, {9, 1, 0}))},
+      {"open", open},
+      {"inside out", turned(sphere(10, 3))},
+      {"far away", moved(sphere(10, 3), 1, {1000, -1000, 500})},
+      {"touching boxes", joined(box({0, 0, 0}, {5, 10, 10}), box({5, 0, 0}, {10, 10, 10}))}};
   for (const auto& [name, s] : cases) {
     SCOPED_TRACE(name);
     const double h = frame_around(s, 24, 0).spacing_mm.x;
@@ -175,7 +177,9 @@ TEST(Meshes, RealOnes) {
   for (const auto& path : paths) {
     const std::string name = path.filename().string();
     // Flat drawings enclose nothing, and this aircraft's skin is a ten-thousandth of its length.
-    if (name.find("alligator") != std::string::npos || name.find("spiral") != std::string::npos || name.find("Generic_Twin") != std::string::npos) continue;
+    if (name.find("alligator") != std::string::npos || name.find("spiral") != std::string::npos ||
+        name.find("Generic_Twin") != std::string::npos)
+      continue;
     SCOPED_TRACE(name);
     const TriangleSoup s = soup_of(*load_surface(path));
     const TetMesh m = stuffed_tets(s, {frame_around(s, 30, 0).spacing_mm.x, 13});
@@ -239,9 +243,9 @@ TEST(Skin, RestAndAffineMotionAreExact) {
         }
         return d;
       };
-      EXPECT_LT(worst({}, {}), 1e-5);                                                              // rest
+      EXPECT_LT(worst({}, {}), 1e-5);  // rest
       const double c = std::cos(0.7), n = std::sin(0.7);
-      EXPECT_LT(worst({{Vec3{c, n, 0}, Vec3{-n, c, 0}, Vec3{0, 0, 1}}}, {3, -2, 1}), 2e-5);        // rigid
+      EXPECT_LT(worst({{Vec3{c, n, 0}, Vec3{-n, c, 0}, Vec3{0, 0, 1}}}, {3, -2, 1}), 2e-5);       // rigid
       const double stretched = worst({{Vec3{1.3, 0, 0}, Vec3{0.2, 1, 0}, Vec3{0, 0, 0.8}}}, {});  // affine
       if (method == SkinMethod::embedded) {
         EXPECT_LT(stretched, 3e-5);

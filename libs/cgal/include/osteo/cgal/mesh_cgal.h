@@ -11,7 +11,8 @@
 namespace osteo {
 
 /// Pairs of triangles that intersect otherwise than in a shared edge or point, by exact predicates; ascending.
-[[nodiscard]] std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const TriangleSoup& surface, const Context& context = {});
+[[nodiscard]] std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const TriangleSoup& surface,
+                                                                                      const Context& context = {});
 
 struct CgalRepairReport {
   std::uint64_t holes_filled = 0, holes_left = 0;

@@ -17,7 +17,9 @@ struct OneWayDistance {
 struct SurfaceComparison {
   OneWayDistance a_to_b, b_to_a;
   [[nodiscard]] double hausdorff_mm() const { return a_to_b.max_mm > b_to_a.max_mm ? a_to_b.max_mm : b_to_a.max_mm; }
-  [[nodiscard]] double hausdorff_bound_mm() const { return a_to_b.max_bound_mm > b_to_a.max_bound_mm ? a_to_b.max_bound_mm : b_to_a.max_bound_mm; }
+  [[nodiscard]] double hausdorff_bound_mm() const {
+    return a_to_b.max_bound_mm > b_to_a.max_bound_mm ? a_to_b.max_bound_mm : b_to_a.max_bound_mm;
+  }
 };
 /// The maximum by branch and bound over triangles: distance changes by no more than one moves, so a triangle whose centre is near
 /// cannot hold the maximum. Stops when bound and maximum agree to 1e-4 of the extents, or after 200,000 questions; then the

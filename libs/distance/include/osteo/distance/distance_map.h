@@ -21,10 +21,10 @@ struct DistanceMap {
   static constexpr int kEdge = 8, kVoxels = 512;
 
   Frame frame;
-  std::vector<Ijk> bricks;               ///< in units of bricks, ascending z, y, x
-  std::vector<std::uint64_t> stored;     ///< 8 words a brick: bit x + 8y of word z, voxels that have a distance
-  std::vector<double> distance_mm;       ///< 512 a brick, x fastest; NaN where not stored
-  std::vector<std::uint32_t> triangle;   ///< 512 a brick: index in the soup
+  std::vector<Ijk> bricks;              ///< in units of bricks, ascending z, y, x
+  std::vector<std::uint64_t> stored;    ///< 8 words a brick: bit x + 8y of word z, voxels that have a distance
+  std::vector<double> distance_mm;      ///< 512 a brick, x fastest; NaN where not stored
+  std::vector<std::uint32_t> triangle;  ///< 512 a brick: index in the soup
 
   [[nodiscard]] std::uint64_t count() const;
   /// Index into distance_mm and triangle, or -1. O(log bricks).
@@ -81,7 +81,9 @@ class SignedDistance {
   };
   /// O(log n + openings). Any number of threads may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
-  [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const { return tree_.closest(point_mm, hint); }
+  [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const {
+    return tree_.closest(point_mm, hint);
+  }
   [[nodiscard]] bool inside(Vec3 point_mm) const;
   [[nodiscard]] bool closed() const { return closed_; }
 

@@ -45,7 +45,8 @@ struct DistanceStage {
     visit({"band_outside_mm", "how far the band reaches outside", "mm", 0, 1e6}, p.band_outside_mm);
     GridParams::describe(p.grid, visit);
     visit({"method", "exact; swept: exact beside the surface, approximate beyond; thesis: its tree search, for comparison"}, p.method);
-    visit({"tree_ascend_n", "thesis: levels up from the last voxel's triangle where the search starts (-1: no such hint)", "", -1, 1000}, p.tree_ascend_n);
+    visit({"tree_ascend_n", "thesis: levels up from the last voxel's triangle where the search starts (-1: no such hint)", "", -1, 1000},
+          p.tree_ascend_n);
     visit({"breadth_first", "thesis: search breadth first"}, p.breadth_first);
     visit({"bound_as_printed", "thesis: the lower bound as printed, which loses nearer triangles"}, p.bound_as_printed);
     visit({"structure", "of labels: the structure by name or value (empty: all together)"}, p.structure);

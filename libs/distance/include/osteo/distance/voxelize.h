@@ -36,9 +36,9 @@ struct VoxelBits {
 
 /// How inside was told from outside.
 struct InsideReport {
-  bool closed = true;                   ///< every edge is used as often one way as the other: the winding number is whole
-  std::uint64_t open_edges = 0;         ///< otherwise: edges that are not
-  std::uint64_t by_solid_angle = 0;     ///< voxels near the openings that were decided by solid angles
+  bool closed = true;                ///< every edge is used as often one way as the other: the winding number is whole
+  std::uint64_t open_edges = 0;      ///< otherwise: edges that are not
+  std::uint64_t by_solid_angle = 0;  ///< voxels near the openings that were decided by solid angles
   std::uint64_t degenerate = 0, duplicates = 0, flipped = 0;  ///< triangles mended for this (not moved)
 };
 
@@ -49,7 +49,8 @@ struct InsideReport {
 /// as inside, cavities whose shell faces inward as outside, an inside-out surface as if it were not.
 /// A centre exactly on the surface counts as one side or the other, each neighbouring pair of triangles agreeing.
 /// O(triangles + crossings + voxels / 64) for closed surfaces. Same result for any thread count.
-[[nodiscard]] VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Context& context = {}, InsideReport* report = nullptr);
+[[nodiscard]] VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Context& context = {},
+                                      InsideReport* report = nullptr);
 
 /// The generalized winding number at a point, from solid angles of all triangles: the reference. O(triangles).
 [[nodiscard]] double winding_number(const TriangleSoup& soup, Vec3 point_mm);

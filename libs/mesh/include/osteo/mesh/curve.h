@@ -13,7 +13,7 @@ struct CurvePoint {
   double t = 0;               ///< 0 at the segment's start, 1 at its end
   double arc_mm = 0;          ///< way along the curve from its start
   double distance_mm = 0;
-  double score_mm = 0;        ///< distance_mm + penalty * |arc_mm - where it was|
+  double score_mm = 0;  ///< distance_mm + penalty * |arc_mm - where it was|
   Vec3 point_mm;
 };
 
@@ -31,7 +31,9 @@ class Curve {
   /// The nearest point. `hint`: a segment probably near. O(log n) for hints that are.
   [[nodiscard]] CurvePoint nearest(Vec3 p, std::uint32_t hint = 0) const { return minimum(p, 0, 0, hint); }
   /// The minimum of |x - p| + penalty * |arc(x) - arc_mm| over all points x of the curve. penalty >= 0.
-  [[nodiscard]] CurvePoint nearest_from(Vec3 p, double arc_mm, double penalty, std::uint32_t hint) const { return minimum(p, arc_mm, penalty, hint); }
+  [[nodiscard]] CurvePoint nearest_from(Vec3 p, double arc_mm, double penalty, std::uint32_t hint) const {
+    return minimum(p, arc_mm, penalty, hint);
+  }
 
   [[nodiscard]] double length_mm() const { return arcs_.empty() ? 0 : arcs_.back(); }
   [[nodiscard]] std::size_t point_count() const { return points_.size(); }

@@ -56,7 +56,8 @@ struct TetrahedralizeStage {
   using Params = TetrahedralizeParams;
   static void describe(Params& p, auto& visit) {
     visit({"method",
-           "grid: five to a voxel; grid-conforming: following the surface, any surface; graded: small at the surface, large inside; tetgen: keeps the "
+           "grid: five to a voxel; grid-conforming: following the surface, any surface; graded: small at the surface, large inside; "
+           "tetgen: keeps the "
            "surface's triangles; cgal: Delaunay refinement"},
           p.method);
     visit({"spacing_mm", "edge of the cubes or tetrahedra (0: from --resolution)", "mm", 0, 1000}, p.spacing_mm);
@@ -64,7 +65,8 @@ struct TetrahedralizeStage {
     visit({"margin", "grid: one voxel more outside, as in the thesis"}, p.margin);
     visit({"target_dihedral_deg", "grid-conforming: improve tetrahedra below this (0: none)", "degrees", 0, 30}, p.target_dihedral_deg);
     visit({"levels", "graded: how often edges double inward", "", 0, 8}, p.levels);
-    visit({"surface_spacing_mm", "cgal: size at the surface, growing inward to spacing_mm (0: the same)", "mm", 0, 1000}, p.surface_spacing_mm);
+    visit({"surface_spacing_mm", "cgal: size at the surface, growing inward to spacing_mm (0: the same)", "mm", 0, 1000},
+          p.surface_spacing_mm);
     visit({"max_volume_mm3", "tetgen: largest volume of a tetrahedron (0: from the spacing)", "mm3", 0, 1e12}, p.max_volume_mm3);
     visit({"clean", "repair the surface first, as mesh-repair does"}, p.clean);
   }

@@ -7,7 +7,7 @@
 namespace osteo {
 
 struct TetgenOptions {
-  double max_volume_mm3 = 0;      ///< 0: no bound
+  double max_volume_mm3 = 0;  ///< 0: no bound
   double radius_edge_ratio = 1.414;
   double min_dihedral_deg = 0;  ///< aimed at by adding points, often in vain and at a high price; 0: not
 };

@@ -12,7 +12,7 @@ namespace osteo {
 struct TetQuality {
   std::uint64_t points = 0, tets = 0;
   std::uint64_t unused_points = 0;
-  std::uint64_t inverted = 0;         ///< volume <= 0
+  std::uint64_t inverted = 0;  ///< volume <= 0
   double volume_mm3 = 0;
   double min_volume_mm3 = 0, max_volume_mm3 = 0;
   double min_dihedral_deg = 0, max_dihedral_deg = 0;

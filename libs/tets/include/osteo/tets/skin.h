@@ -44,8 +44,8 @@ class Skin {
     std::array<float, 4> w;
   };
   struct FrameOf {
-    std::uint32_t point, edge_to;       // mesh points
-    std::uint32_t first, count;         // its triangles in fan_
+    std::uint32_t point, edge_to;  // mesh points
+    std::uint32_t first, count;    // its triangles in fan_
   };
   struct Vote {
     std::uint32_t frame;
@@ -71,7 +71,8 @@ struct SkinParams {
 struct SkinStage {
   using Params = SkinParams;
   static void describe(Params& p, auto& visit) {
-    visit({"method", "embedded: by position in the tetrahedron; frames: by frames on the nearest surface points, as in the thesis"}, p.method);
+    visit({"method", "embedded: by position in the tetrahedron; frames: by frames on the nearest surface points, as in the thesis"},
+          p.method);
     visit({"neighbours", "frames: how many surface points each point follows", "", 1, 16}, p.neighbours);
   }
   static StageInfo info();

@@ -9,8 +9,8 @@
 namespace osteo {
 
 struct StuffingOptions {
-  double spacing_mm = 1;           ///< edge of the lattice's cubes
-  double target_dihedral_deg = 15; ///< tetrahedra below this are improved by moving points; 0: as the stencils leave them
+  double spacing_mm = 1;            ///< edge of the lattice's cubes
+  double target_dihedral_deg = 15;  ///< tetrahedra below this are improved by moving points; 0: as the stencils leave them
 };
 
 /// Fills a surface with tetrahedra of a body-centred cubic lattice; lattice points near the surface are moved onto it, and
