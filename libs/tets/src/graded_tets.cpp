@@ -101,33 +101,38 @@ TetMesh graded_tets(const TriangleSoup& surface, const GradedOptions& options, c
     for (const auto v : t.v) r = std::max(r, length(mesh.points[v] - c));
     return r;
   };
+  // Whether a tetrahedron may meet the surface: unknown until asked. Halves of one that does not, do not.
+  enum : std::uint8_t { kUnknown, kNo, kYes };
   std::vector<std::uint8_t> meets;
-  std::size_t tested = 0;
-  const int deepest = 3 * options.levels;  // three halvings halve every edge
-  // From which on a tetrahedron is to be halved: it may meet the surface and is not small enough.
   const auto test = [&] {
-    meets.resize(mesh.tets.size(), 0);
-    parallel_for(mesh.tets.size() - tested, 512, context.threads, [&](std::size_t begin, std::size_t end) {
+    meets.resize(mesh.tets.size(), kUnknown);
+    parallel_for(mesh.tets.size(), 512, context.threads, [&](std::size_t begin, std::size_t end) {
       context.check_cancelled();
-      std::uint32_t hint = 0;
-      for (std::size_t i = tested + begin; i < tested + end; ++i) {
+      std::uint32_t hint = ClosestPoint::kNone;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (meets[i] != kUnknown) continue;
         const Tet& t = mesh.tets[i];
         const Vec3 c = centre(t);
-        const ClosestPoint p = distance.closest(c, begin == 0 ? ClosestPoint::kNone : hint);
-        hint = p.triangle;
-        meets[i] = p.distance_mm <= reach(t, c) ? 1 : 0;
+        const double r = reach(t, c);
+        const ClosestPoint p = distance.closest(c, hint, r);
+        if (p.triangle != ClosestPoint::kNone) hint = p.triangle;
+        meets[i] = p.distance_mm <= r ? kYes : kNo;
       }
     });
-    tested = mesh.tets.size();
   };
+  const auto halve = [&](std::size_t i) {
+    mesh.halve(i);
+    meets.resize(mesh.tets.size(), kUnknown);
+    const std::uint8_t known = meets[i] == kNo ? kNo : kUnknown;
+    meets[i] = meets.back() = known;
+  };
+  const int deepest = 3 * options.levels;  // three halvings halve every edge
   test();
   for (int level = 0; level < deepest; ++level) {
     context.progress(0.1 + 0.7 * level / deepest, "halving tetrahedra at the surface");
     const std::size_t count = mesh.tets.size();
-    std::vector<std::uint8_t> halve(count, 0);
-    for (std::size_t i = 0; i < count; ++i) halve[i] = meets[i] != 0 && mesh.tets[i].depth <= level ? 1 : 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (halve[i] != 0) mesh.halve(i);
+      if (meets[i] == kYes && mesh.tets[i].depth <= level) halve(i);
     }
     // Neighbours follow until no edge has a point in its middle.
     for (bool again = true; again;) {
@@ -135,13 +140,11 @@ TetMesh graded_tets(const TriangleSoup& surface, const GradedOptions& options, c
       const std::size_t now = mesh.tets.size();
       for (std::size_t i = 0; i < now; ++i) {
         if (mesh.hangs(mesh.tets[i])) {
-          mesh.halve(i);
+          halve(i);
           again = true;
         }
       }
     }
-    tested = 0;  // halves replace their parents in place
-    meets.clear();
     test();
   }
   std::vector<std::uint8_t> kept(mesh.tets.size(), 0);

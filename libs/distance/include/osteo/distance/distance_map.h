@@ -81,9 +81,12 @@ class SignedDistance {
   };
   /// O(log n + openings). Any number of threads may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
-  [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const {
-    return tree_.closest(point_mm, hint);
+  /// As of TriangleTree.
+  [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone,
+                                     double limit_mm = std::numeric_limits<double>::infinity()) const {
+    return tree_.closest(point_mm, hint, limit_mm);
   }
+  /// Without the distance.
   [[nodiscard]] bool inside(Vec3 point_mm) const;
   [[nodiscard]] bool closed() const { return closed_; }
 
