@@ -208,6 +208,8 @@ bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
       fresh = vtkSmartPointer<vtkImageData>::New();
     else if (wanted == "vtkPolyData")
       fresh = vtkSmartPointer<vtkPolyData>::New();
+    else if (wanted == "vtkUnstructuredGrid")
+      fresh = vtkSmartPointer<vtkUnstructuredGrid>::New();
     else
       fresh = vtkSmartPointer<vtkOsteoDataObject>::New();
     info->Set(vtkDataObject::DATA_OBJECT(), fresh);
@@ -215,13 +217,19 @@ bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
   return true;
 }
 
-// Whoever reads an image wants to know its extent before it exists. A stage without VTK inputs is run here for that; one
-// with an image as input keeps that image's lattice (Execute checks that it did).
+// Whoever reads an image wants to know its extent before it exists. A stage without an image as input is run here for that; one
+// with an image keeps that image's lattice (Execute checks that it did).
 bool vtkOsteoStage::Inform(vtkInformationVector** inputs, vtkInformationVector* outputs) {
   const auto& ports = this->Stage->info().outputs;
   const bool makes_image = std::any_of(ports.begin(), ports.end(), [](const auto& p) { return is_image(p.kinds.front()); });
   if (!makes_image) return true;
-  if (this->GetNumberOfInputPorts() == 0) {
+  const bool from_image = this->GetNumberOfInputPorts() > 0 && inputs[0]->GetNumberOfInformationObjects() > 0 &&
+                          vtkImageData::SafeDownCast(inputs[0]->GetInformationObject(0)->Get(vtkDataObject::DATA_OBJECT())) != nullptr;
+  if (!from_image) {
+    for (int p = 0; p < this->GetNumberOfInputPorts(); ++p) {
+      for (int c = 0; c < this->GetNumberOfInputConnections(p); ++c) this->GetInputAlgorithm(p, c)->Update();
+      this->Results.clear();
+    }
     if ((this->Results.empty() || this->ResultsTime < this->Superclass::GetMTime()) && !this->Run(inputs)) return false;
     for (std::size_t p = 0; p < ports.size(); ++p) {
       vtkSmartPointer<vtkImageData> image;
@@ -284,7 +292,7 @@ bool vtkOsteoStage::Run(vtkInformationVector** inputs) {
 }
 
 bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector* outputs) {
-  const bool ready = this->GetNumberOfInputPorts() == 0 && !this->Results.empty() && this->ResultsTime >= this->Superclass::GetMTime();
+  const bool ready = !this->Results.empty() && this->ResultsTime >= this->Superclass::GetMTime();
   if (!ready && !this->Run(inputs)) return false;
   for (std::size_t p = 0; p < this->Results.size(); ++p) {
     vtkInformation* const info = outputs->GetInformationObject(static_cast<int>(p));

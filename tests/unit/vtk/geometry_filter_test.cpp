@@ -57,6 +57,12 @@ TEST(VtkGeometry, SphereToTetrahedraToSkin) {
   ASSERT_TRUE(voxels->SetParameter("resolution", "20"));
   voxels->SetInputConnection(sphere->GetOutputPort());
   voxels->Update();
+  EXPECT_EQ(voxels->GetErrorCode(), 0UL);
+  EXPECT_GT(vtkImageData::SafeDownCast(voxels->GetOutputDataObject(0))->GetScalarRange()[1], 1);
+  sphere->SetRadius(12);  // a change upstream arrives, with another extent
+  voxels->SetParameter("spacing_mm", "1");
+  voxels->Update();
+  EXPECT_EQ(voxels->GetErrorCode(), 0UL);
   auto* const image = vtkImageData::SafeDownCast(voxels->GetOutputDataObject(0));
   ASSERT_NE(image, nullptr);
   EXPECT_GT(image->GetNumberOfPoints(), 8000);
