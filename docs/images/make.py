@@ -110,3 +110,11 @@ picture("ear-ct.nrrd", "guide-structures.png", "--mask", "inside.seg.nrrd", "--s
 for record in here.glob("*.prov.json"):
     record.unlink()
 shutil.rmtree(work)
+
+# A temporal bone's surface as tetrahedra that follow it.
+osteo("phantom", "temporal.nrrd", "--region", "temporal", "--spacing-mm", 1.5)
+osteo("threshold", "temporal.nrrd", "temporal-mask.nrrd", "--lower", 500)
+osteo("resample", "temporal.nrrd", "temporal-mask.nrrd", "temporal.vdb", "--lower", 500, "--spacing-mm", 1)
+osteo("surface", "temporal.vdb", "temporal.ply")
+osteo("tetrahedralize", "temporal.ply", "temporal.vtu", "--spacing-mm", 2.5)
+picture("temporal.vtu", "guide-tetrahedra.png", "--view", "left")

@@ -77,7 +77,7 @@ struct Kernel {
   void (*measure_block)(const ExactTriangle*, const std::uint32_t* ids, int count, const double* px, const double* py, const double* pz,
                         int points, double* best_d2, std::uint32_t* best_id);
   /// The triangle nearest to a point. `hint` is any triangle; a near one makes it fast. Only triangles nearer than
-  /// sqrt(limit_d2); else triangle = 0xffffffff. visited: 3 KiB stack inside, no allocation.
+  /// sqrt(limit_d2); else triangle = 0xffffffff. Allocates nothing.
   Nearest (*closest)(const TreeView&, const double point[3], std::uint32_t hint, double limit_d2);
   /// Packs that may hold the nearest triangle of some point of the box centre +- half, given a pivot.
   /// Points farther than `reach` from everything do not matter.

@@ -1,9 +1,10 @@
+#include "osteo/distance/mask_distance.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
-#include "osteo/distance/stages.h"
 #include "osteo/grid/brick_values.h"
 #include "osteo/image/distance.h"
 

@@ -8,6 +8,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
+#include "osteo/distance/mask_distance.h"
 #include "osteo/distance/swept_distance.h"
 #include "osteo/distance/thesis_distance.h"
 #include "osteo/grid/brick_values.h"

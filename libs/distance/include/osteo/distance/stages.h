@@ -81,10 +81,4 @@ struct VoxelizeStage {
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
-/// Signed Euclidean distance of a mask, between voxel centres: outside to the nearest voxel of the mask, inside (negative) to the
-/// nearest voxel that is not in it. Exact for the voxels, which stand for the true surface to about half a voxel. Of `wanted`
-/// structure values together. Voxels farther than the band are not stored.
-[[nodiscard]] SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options,
-                                       const Context& context = {});
-
 }  // namespace osteo
