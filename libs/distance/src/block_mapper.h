@@ -69,7 +69,10 @@ class BlockMapper {
     const Vec3 centre = centre_of(at, edge);
     const double c[3] = {centre.x, centre.y, centre.z};
     const double radius = std::sqrt(double(half[0]) * half[0] + double(half[1]) * half[1] + double(half[2]) * half[2]);
-    const double limit = std::isfinite(reach_) ? (static_cast<double>(reach_) + radius) * 1.00001 + tree_.view.margin : 1e150;
+    // Single precision rounds more, the farther the block lies from the surface.
+    margin_ = tree_.view.margin *
+              static_cast<float>(std::max(1.0, std::max(std::abs(c[0]), std::max(std::abs(c[1]), std::abs(c[2]))) / 128));
+    const double limit = std::isfinite(reach_) ? (static_cast<double>(reach_) + radius) * 1.00001 + static_cast<double>(margin_) : 1e150;
     const distance::Nearest nearest = kernel_.closest(tree_.view, c, hint, limit * limit);
     if (nearest.triangle == ClosestPoint::kNone) return;
     hint = nearest.triangle;
@@ -80,7 +83,7 @@ class BlockMapper {
     const float cf[3] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
     // The scratch outlives a map: another tree may have more packs.
     if (s_.packs.size() < tree_.view.triangles / 16 + 32) s_.packs.resize(tree_.view.triangles / 16 + 32);
-    const int packs = kernel_.collect(tree_.view, cf, half, pivot, reach_, s_.packs.data());
+    const int packs = kernel_.collect(tree_.view, cf, half, pivot, reach_, margin_, s_.packs.data());
     s_.ids.resize(static_cast<std::size_t>(packs) * 16);
     std::size_t count = 0;
     for (int p = 0; p < packs; ++p) {
@@ -120,7 +123,7 @@ class BlockMapper {
     task.records = tree_.view.records;
     task.ids = ids;
     task.count = static_cast<int>(count);
-    task.margin = tree_.view.margin;
+    task.margin = margin_;
     task.reach = reach_;
     task.wanted = 0;
     const std::size_t room = padded(count);
@@ -236,7 +239,7 @@ class BlockMapper {
   Vec3 origin_, step_;
   std::array<int, 3> lo_{};
   const std::array<std::uint16_t, 256>* wanted_ = nullptr;
-  float reach_ = 0;
+  float reach_ = 0, margin_ = 0;
 };
 
 // From which edge on it is cheapest to hand lists down, for surfaces with `density` triangles a voxel face. Nanoseconds a

@@ -35,7 +35,7 @@ struct TreeView {
   const BoxGroup* boxes[kMaxLevels];
   int levels;
   std::uint32_t triangles;
-  float margin;  ///< rounding of any single-precision distance, besides each triangle's slack
+  float margin;  ///< rounding of any single-precision distance within 128 units of the centre, besides each triangle's slack
 };
 
 /// What is nearest to `centre`, and so bounds the distance of all points near it: distance and unit direction from there to it.
@@ -80,8 +80,8 @@ struct Kernel {
   /// sqrt(limit_d2); else triangle = 0xffffffff. Allocates nothing.
   Nearest (*closest)(const TreeView&, const double point[3], std::uint32_t hint, double limit_d2);
   /// Packs that may hold the nearest triangle of some point of the box centre +- half, given a pivot.
-  /// Points farther than `reach` from everything do not matter.
-  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, float reach, std::uint32_t* packs);
+  /// Points farther than `reach` from everything do not matter. `margin`: rounding there.
+  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, float reach, float margin, std::uint32_t* packs);
 };
 
 extern const Kernel kScalar;

@@ -316,7 +316,8 @@ Nearest closest(const TreeView& tree, const double p[3], std::uint32_t hint, dou
   return best;
 }
 
-int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, float reach, std::uint32_t* packs) {
+int collect(const TreeView& tree, const float centre[3], const float half[3], const Pivot& pivot, float reach, float margin,
+            std::uint32_t* packs) {
   struct Entry {
     std::uint32_t group;
     int level;
@@ -325,13 +326,13 @@ int collect(const TreeView& tree, const float centre[3], const float half[3], co
   int top = 0, count = 0;
   const float r2 = half[0] * half[0] + half[1] * half[1] + half[2] * half[2];
   const float r = __builtin_sqrtf(r2);
-  const float m = pivot.distance + tree.margin;
+  const float m = pivot.distance + margin;
   const F px = F::all(centre[0]), py = F::all(centre[1]), pz = F::all(centre[2]);
-  const F base = F::all(m + tree.margin + r * 4e-6F + m * 1e-6F);
+  const F base = F::all(m + margin + r * 4e-6F + m * 1e-6F);
   const F curve = F::all(m > 0 ? r2 / (2 * m) : 3e38F), most = F::all(2 * r);
   const F hx = F::all(half[0]), hy = F::all(half[1]), hz = F::all(half[2]);
   const F ox = F::all(pivot.direction[0]), oy = F::all(pivot.direction[1]), oz = F::all(pivot.direction[2]);
-  const F zero = F::all(0), tiny = F::all(1e-30F), limit = F::all(reach + r * 1.00001F + 2 * tree.margin);
+  const F zero = F::all(0), tiny = F::all(1e-30F), limit = F::all(reach + r * 1.00001F + 2 * margin);
   stack[top++] = {0, tree.levels - 1};
   while (top > 0) {
     const Entry e = stack[--top];

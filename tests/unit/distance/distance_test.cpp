@@ -294,6 +294,17 @@ TEST(DistanceMap, SameBytesForAnyThreads) {
   EXPECT_EQ(std::memcmp(a.distance_mm.data(), b.distance_mm.data(), a.distance_mm.size() * 8), 0);
 }
 
+TEST(DistanceMap, GridFarLargerThanTheSurface) {
+  const TriangleSoup s = joined(sphere(1, 3), sphere(0.7, 3, {1.2, 0.4, 0.3}));
+  Frame f;
+  f.dims = {40, 36, 33};
+  f.spacing_mm = {30, 30, 30};
+  f.origin_mm = {-500, -700, -300};
+  const Worst w = compare(DistanceMapper(s, f).map(), s, s, 17);
+  EXPECT_LT(w.distance_voxels, 1e-12);
+  EXPECT_EQ(w.wrong_sign, 0U);
+}
+
 TEST(DistanceMap, CoarseVoxelsOnManyTriangles) {
   const TriangleSoup s = sphere(10, 6);  // 81,920 triangles, 8 voxels across
   const Frame f = frame_around(s, 8, 2);
