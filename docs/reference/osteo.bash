@@ -33,7 +33,7 @@ _osteo() {
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
     mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
     compare) flags="$flags --xml --describe --iso" ;;
-    distance) flags="$flags --xml --describe --region --band-inside-mm --band-outside-mm --spacing-mm --resolution --margin-voxels --method --tree-ascend-n --breadth-first --bound-as-printed --structure --like --nearest-out" ;;
+    distance) flags="$flags --xml --describe --region --band-inside-mm --band-outside-mm --spacing-mm --resolution --margin-voxels --method --tree-ascend-n --breadth-first --bound-as-printed --structure --name-nearest --like --nearest-out" ;;
     distance-at) flags="$flags --xml --describe" ;;
     voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;

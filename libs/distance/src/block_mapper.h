@@ -70,8 +70,8 @@ class BlockMapper {
     const double c[3] = {centre.x, centre.y, centre.z};
     const double radius = std::sqrt(double(half[0]) * half[0] + double(half[1]) * half[1] + double(half[2]) * half[2]);
     // Single precision rounds more, the farther the block lies from the surface.
-    margin_ = tree_.view.margin *
-              static_cast<float>(std::max(1.0, std::max(std::abs(c[0]), std::max(std::abs(c[1]), std::abs(c[2]))) / 128));
+    margin_ =
+        tree_.view.margin * static_cast<float>(std::max(1.0, std::max(std::abs(c[0]), std::max(std::abs(c[1]), std::abs(c[2]))) / 128));
     const double limit = std::isfinite(reach_) ? (static_cast<double>(reach_) + radius) * 1.00001 + static_cast<double>(margin_) : 1e150;
     const distance::Nearest nearest = kernel_.closest(tree_.view, c, hint, limit * limit);
     if (nearest.triangle == ClosestPoint::kNone) return;

@@ -81,7 +81,8 @@ struct Kernel {
   Nearest (*closest)(const TreeView&, const double point[3], std::uint32_t hint, double limit_d2);
   /// Packs that may hold the nearest triangle of some point of the box centre +- half, given a pivot.
   /// Points farther than `reach` from everything do not matter. `margin`: rounding there.
-  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, float reach, float margin, std::uint32_t* packs);
+  int (*collect)(const TreeView&, const float centre[3], const float half[3], const Pivot&, float reach, float margin,
+                 std::uint32_t* packs);
 };
 
 extern const Kernel kScalar;

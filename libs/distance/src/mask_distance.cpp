@@ -10,8 +10,8 @@
 
 namespace osteo {
 
-SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options,
-                         const Context& context) {
+MaskDistance mask_distance(const Labels& labels, std::span<const std::uint8_t> wanted, const DistanceMapOptions& options, bool name_nearest,
+                           const Context& context) {
   const Frame& f = labels.frame;
   std::array<std::uint8_t, 256> is{};
   for (const std::uint8_t v : wanted) is[v] = 1;
@@ -52,6 +52,35 @@ SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wan
   };
   if (options.region != DistanceRegion::interior) take(1, 1.0F, options.band_outside_mm, context.sub(0, 0.5));
   take(0, -1.0F, options.band_inside_mm, context.sub(0.5, 0.9));
+  std::vector<std::vector<float>> names(name_nearest ? count : 0), best(names.size());
+  if (name_nearest) {
+    std::array<std::uint8_t, 256> present{};
+    for (const std::uint8_t v : labels.span()) present[v] = is[v];
+    for (int value = 1; value < 256; ++value) {
+      if (present[static_cast<std::size_t>(value)] == 0) continue;
+      const std::vector<float> d2 = squared_distance_mm2(labels.span(), f, static_cast<std::uint8_t>(value), context.sub(0.9, 0.9));
+      parallel_for(count, 16, context.threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+          if (values[b].empty()) continue;
+          if (names[b].empty()) {
+            names[b].assign(512, 0.0F);
+            best[b].assign(512, std::numeric_limits<float>::infinity());
+          }
+          const auto bi = static_cast<int>(b % bricks_along(0)) * 8, bj = static_cast<int>(b / bricks_along(0) % bricks_along(1)) * 8,
+                     bk = static_cast<int>(b / bricks_along(0) / bricks_along(1)) * 8;
+          for (std::size_t v = 0; v < 512; ++v) {
+            if ((stored[b * 8 + (v >> 6)] >> (v & 63) & 1U) == 0) continue;
+            const float d =
+                d2[labels.offset(bi + static_cast<int>(v & 7), bj + static_cast<int>(v >> 3 & 7), bk + static_cast<int>(v >> 6))];
+            if (d >= best[b][v]) continue;
+            best[b][v] = d;
+            names[b][v] = static_cast<float>(value);
+          }
+        }
+      });
+    }
+  }
+  std::vector<float> packed_names;
   std::vector<Ijk> bricks;
   std::vector<std::uint64_t> packed_bits;
   std::vector<float> packed;
@@ -64,10 +93,13 @@ SparseGrid mask_distance(const Labels& labels, std::span<const std::uint8_t> wan
                        stored.begin() + static_cast<std::ptrdiff_t>(b * 8 + 8));
     packed.insert(packed.end(), values[b].begin(), values[b].end());
     farthest = std::max(farthest, *std::max_element(values[b].begin(), values[b].end()));
+    if (name_nearest) packed_names.insert(packed_names.end(), names[b].begin(), names[b].end());
     values[b] = {};
   }
   context.progress(1.0);
-  return to_sparse(f, "distance_mm", bricks, packed_bits, packed, farthest);
+  MaskDistance result{to_sparse(f, "distance_mm", bricks, packed_bits, packed, farthest), {}};
+  if (name_nearest) result.nearest = to_sparse(f, "nearest_structure", bricks, packed_bits, packed_names, 0);
+  return result;
 }
 
 }  // namespace osteo

@@ -147,7 +147,10 @@ StageInfo DistanceStage::info() {
       .inputs = {{"subject", {DataKind::surface, DataKind::labels}, "surface, mask or label map"},
                  {"like", {DataKind::image, DataKind::labels, DataKind::grid}, "put the voxels where this volume's are", true}},
       .outputs = {{"distance", {DataKind::grid}, "distance in mm, negative inside; far voxels are not stored"},
-                  {"nearest", {DataKind::grid}, "index of the nearest triangle in the same voxels", true}},
+                  {"nearest",
+                   {DataKind::grid},
+                   "index of the nearest triangle, or with --name-nearest value of the nearest structure, in the same voxels",
+                   true}},
       .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.3",
                      "A. Jacobson et al., Robust Inside-Outside Segmentation using Generalized Winding Numbers, SIGGRAPH 2013",
                      "P. Felzenszwalb and D. Huttenlocher, Distance Transforms of Sampled Functions, Theory of Computing 2012"},
@@ -159,10 +162,12 @@ std::vector<Data> DistanceStage::run(const Params& p, std::span<const Data> inpu
   if (const auto* labels = std::get_if<Labels>(&inputs[0])) {
     if (frame_of(inputs[1]) != nullptr) throw Error(ExitCode::usage, "labels bring their own voxels; leave out --like");
     const std::vector<std::uint8_t> values = values_of(*labels, p.structure);
-    SparseGrid grid = mask_distance(*labels, values, options, context);
-    context.report("voxels", static_cast<std::int64_t>(grid.active_voxels));
+    MaskDistance found = mask_distance(*labels, values, options, p.name_nearest, context);
+    context.report("voxels", static_cast<std::int64_t>(found.distance.active_voxels));
     context.report("sign_by", std::string("mask"));
-    return {std::move(grid), std::monostate{}};
+    Data nearest;
+    if (p.name_nearest) nearest = std::move(found.nearest);
+    return {std::move(found.distance), std::move(nearest)};
   }
   const TriangleSoup surface = soup_of(*std::get<Surface>(inputs[0]));
   const Frame* const like = frame_of(inputs[1]);

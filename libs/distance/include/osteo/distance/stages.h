@@ -35,6 +35,7 @@ struct DistanceParams {
   bool breadth_first = false;
   bool bound_as_printed = false;
   std::string structure;
+  bool name_nearest = false;
 };
 
 struct DistanceStage {
@@ -50,6 +51,7 @@ struct DistanceStage {
     visit({"breadth_first", "thesis: search breadth first"}, p.breadth_first);
     visit({"bound_as_printed", "thesis: the lower bound as printed, which loses nearer triangles"}, p.bound_as_printed);
     visit({"structure", "of labels: the structure by name or value (empty: all together)"}, p.structure);
+    visit({"name_nearest", "of labels: say in the second grid which structure is the nearest"}, p.name_nearest);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
