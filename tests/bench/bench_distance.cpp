@@ -319,7 +319,7 @@ void mask_table(const Context& context, const fs::path& folder) {
   std::printf("| ours, both sides to a sparse band, %d threads | %.2f |\n", 2,
               wall(
                   [&] {
-                    sparse = mask_distance(labels, {&value, 1}, {DistanceRegion::band, 3, 3}, context);
+                    sparse = mask_distance(labels, {&value, 1}, {DistanceRegion::band, 3, 3}, false, context).distance;
                   },
                   1));
   write_raw(folder / "mask.u8", mask);
