@@ -120,18 +120,11 @@ TriangleSoup soup_from(const Data& data, double iso, const Context& context) {
 
 SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b, const Context& context) {
   const TriangleTree tree_a(a, context), tree_b(b, context);
-  Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-  for (const TriangleSoup* s : {&a, &b}) {
-    for (const auto& t : s->triangles) {
-      for (const auto v : t) {
-        for (std::size_t x = 0; x < 3; ++x) {
-          lo[x] = std::min(lo[x], s->points_mm[v][x]);
-          hi[x] = std::max(hi[x], s->points_mm[v][x]);
-        }
-      }
-    }
-  }
-  const double extent = length(hi - lo);
+  BoxMm both = bounds_of(a);
+  const BoxMm other = bounds_of(b);
+  both.include(other.lo);
+  both.include(other.hi);
+  const double extent = length(both.hi - both.lo);
   SurfaceComparison result;
   context.progress(0.1, "comparing");
   result.a_to_b = one_way(a, tree_b, extent, context);

@@ -35,9 +35,7 @@ std::array<int, 3> LiveDistance::cell_of(const std::array<Vec3, 3>& t) const {
 }
 
 LiveDistance::Brick& LiveDistance::brick_for(int bi, int bj, int bk) {
-  std::int32_t& place = table_[(static_cast<std::size_t>(bk) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(bj)) *
-                                   static_cast<std::size_t>(cells_[0]) +
-                               static_cast<std::size_t>(bi)];
+  std::int32_t& place = table_[cell(bi, bj, bk)];
   if (place < 0) {
     place = static_cast<std::int32_t>(bricks_.size());
     bricks_.emplace_back();
@@ -49,10 +47,7 @@ LiveDistance::Brick& LiveDistance::brick_for(int bi, int bj, int bk) {
 
 LiveDistance::Sample LiveDistance::at(int i, int j, int k) const {
   if (i < 0 || j < 0 || k < 0 || i >= frame_.dims[0] || j >= frame_.dims[1] || k >= frame_.dims[2]) return {};
-  const std::int32_t place =
-      table_[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(j / 8)) *
-                 static_cast<std::size_t>(cells_[0]) +
-             static_cast<std::size_t>(i / 8)];
+  const std::int32_t place = table_[cell(i / 8, j / 8, k / 8)];
   if (place < 0) return {};
   const Brick& b = bricks_[static_cast<std::size_t>(place)];
   const auto v = static_cast<std::size_t>((i & 7) + 8 * (j & 7) + 64 * (k & 7));
@@ -76,9 +71,7 @@ std::uint32_t LiveDistance::update(std::span<const std::uint32_t> removed, std::
   };
   const auto cell_list = [&](const std::array<Vec3, 3>& t) -> std::vector<std::uint32_t>& {
     const auto c = cell_of(t);
-    return in_cell_[(static_cast<std::size_t>(c[2]) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(c[1])) *
-                        static_cast<std::size_t>(cells_[0]) +
-                    static_cast<std::size_t>(c[0])];
+    return in_cell_[cell(c[0], c[1], c[2])];
   };
   for (const std::uint32_t id : removed) {
     if (id >= triangles_.size() || alive_[id] == 0)
@@ -164,9 +157,7 @@ void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const V
   for (int z = first_cell[2]; z <= last_cell[2]; ++z) {
     for (int y = first_cell[1]; y <= last_cell[1]; ++y) {
       for (int x = first_cell[0]; x <= last_cell[0]; ++x) {
-        const auto& list = in_cell_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(y)) *
-                                        static_cast<std::size_t>(cells_[0]) +
-                                    static_cast<std::size_t>(x)];
+        const auto& list = in_cell_[cell(x, y, z)];
         for (const std::uint32_t id : list) {
           const auto n = static_cast<std::uint32_t>(near.points_mm.size());
           for (const Vec3 p : triangles_[id]) near.points_mm.push_back(p);

@@ -220,15 +220,7 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   Data& d = *made;
   d.axes = axes;
   // Only points in use count: a stray one far away must not cost precision.
-  Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-  for (const auto& t : soup.triangles) {
-    for (const auto v : t) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], soup.points_mm[v][a]);
-        hi[a] = std::max(hi[a], soup.points_mm[v][a]);
-      }
-    }
-  }
+  const auto [lo, hi] = bounds_of(soup);
   d.centre_mm = (lo + hi) * 0.5;
   const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   d.unit_mm = extent > 0 ? std::exp2(std::ceil(std::log2(extent)) - 7) : 1.0;  // the extent becomes 64 to 128 units

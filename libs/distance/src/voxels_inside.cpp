@@ -342,15 +342,7 @@ double winding_number(const TriangleSoup& soup, Vec3 p) {
 Frame frame_around_mm(const TriangleSoup& soup, double spacing_mm, int margin) {
   require_sound(soup);
   if (soup.triangles.empty()) throw Error(ExitCode::failed, "the surface has no triangles");
-  Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-  for (const auto& t : soup.triangles) {
-    for (const auto v : t) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], soup.points_mm[v][a]);
-        hi[a] = std::max(hi[a], soup.points_mm[v][a]);
-      }
-    }
-  }
+  const auto [lo, hi] = bounds_of(soup);
   Frame f;
   f.spacing_mm = {spacing_mm, spacing_mm, spacing_mm};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -367,14 +359,9 @@ Frame frame_around_mm(const TriangleSoup& soup, double spacing_mm, int margin) {
 }
 
 Frame frame_around(const TriangleSoup& soup, int resolution, int margin) {
-  double longest = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    double lo = 1e300, hi = -1e300;
-    for (const auto& t : soup.triangles) {
-      for (const auto v : t) lo = std::min(lo, soup.points_mm[v][a]), hi = std::max(hi, soup.points_mm[v][a]);
-    }
-    longest = std::max(longest, hi - lo);
-  }
+  require_sound(soup);
+  const auto [lo, hi] = bounds_of(soup);
+  const double longest = std::max({0.0, hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
   return frame_around_mm(soup, longest > 0 ? longest / resolution : 1.0, margin);
 }
 

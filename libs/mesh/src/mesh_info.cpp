@@ -106,17 +106,14 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
   edges.reserve(welded.triangles.size() * 2);
   s.min_edge_mm = welded.triangles.empty() ? 0 : 1e300;
   double edge_sum = 0;
-  s.lo_mm = {1e300, 1e300, 1e300};
-  s.hi_mm = {-1e300, -1e300, -1e300};
+  const auto [lo, hi] = bounds_of({o.soup.points_mm, welded.triangles});
+  s.lo_mm = lo;
+  s.hi_mm = hi;
   for (const auto& t : welded.triangles) {
     Vec3 p[3];
     double l[3];
     for (std::size_t i = 0; i < 3; ++i) {
       p[i] = o.soup.points_mm[t[i]];
-      for (std::size_t a = 0; a < 3; ++a) {
-        s.lo_mm[a] = std::min(s.lo_mm[a], p[i][a]);
-        s.hi_mm[a] = std::max(s.hi_mm[a], p[i][a]);
-      }
     }
     for (std::size_t i = 0; i < 3; ++i) {
       l[i] = length(p[(i + 1) % 3] - p[i]);
@@ -228,17 +225,12 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
   std::uint32_t count = 0;
   const std::vector<std::uint32_t> body = bodies_of(o.soup, count);
   std::vector<double> area(count, 0), volume(count, 0);
-  std::vector<Vec3> lo(count, {1e300, 1e300, 1e300}), hi(count, {-1e300, -1e300, -1e300});
+  std::vector<BoxMm> box(count);
   for (std::size_t t = 0; t < body.size(); ++t) {
     const auto& v = o.soup.triangles[t];
     area[body[t]] += length(cross(o.soup.points_mm[v[1]] - o.soup.points_mm[v[0]], o.soup.points_mm[v[2]] - o.soup.points_mm[v[0]])) / 2;
     volume[body[t]] += signed_volume(o.soup, v, o.soup.points_mm[o.soup.triangles[0][0]]);
-    for (const auto i : v) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[body[t]][a] = std::min(lo[body[t]][a], o.soup.points_mm[i][a]);
-        hi[body[t]][a] = std::max(hi[body[t]][a], o.soup.points_mm[i][a]);
-      }
-    }
+    for (const auto i : v) box[body[t]].include(o.soup.points_mm[i]);
   }
   std::vector<std::uint8_t> open(count, 0);
   std::vector<std::uint32_t> body_of_point(o.soup.points_mm.size(), 0);
@@ -263,7 +255,7 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
     for (std::uint32_t other = 0; other < count && !cavity; ++other) {
       if (other == b || volume[other] <= -volume[b] || open[other] != 0) continue;
       bool within = true;
-      for (std::size_t a = 0; a < 3; ++a) within &= lo[other][a] <= lo[b][a] && hi[b][a] <= hi[other][a];
+      for (std::size_t a = 0; a < 3; ++a) within &= box[other].lo[a] <= box[b].lo[a] && box[b].hi[a] <= box[other].hi[a];
       cavity = within;
     }
     if (!cavity) {

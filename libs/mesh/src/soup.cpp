@@ -37,6 +37,14 @@ TriangleSoup soup_of(const TriMesh& mesh) {
   return soup;
 }
 
+BoxMm bounds_of(const TriangleSoup& soup) {
+  BoxMm box;
+  for (const auto& t : soup.triangles) {
+    for (const auto v : t) box.include(soup.points_mm[v]);
+  }
+  return box;
+}
+
 TriMesh mesh_of(const TriangleSoup& soup) {
   constexpr std::uint32_t kUnused = 0xffffffffU;
   std::vector<std::uint32_t> place(soup.points_mm.size(), kUnused);

@@ -41,6 +41,11 @@ class LiveDistance {
     std::array<double, 512> distance_mm;
     std::array<std::uint32_t, 512> triangle;
   };
+  [[nodiscard]] std::size_t cell(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(cells_[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(cells_[0]) +
+           static_cast<std::size_t>(i);
+  }
   [[nodiscard]] Brick& brick_for(int bi, int bj, int bk);
   [[nodiscard]] std::array<int, 3> cell_of(const std::array<Vec3, 3>& t) const;
   void measure(std::array<int, 3> lo, std::array<int, 3> hi, const VoxelBits& wanted, const InsideAt& inside);

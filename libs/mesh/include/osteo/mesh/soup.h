@@ -19,6 +19,19 @@ struct TriangleSoup {
 void require_sound(const TriangleSoup& soup);
 /// Errors as require_sound.
 [[nodiscard]] TriangleSoup soup_of(const TriMesh& mesh);
+/// A box by its lowest and highest corner; lowest > highest when it holds nothing.
+struct BoxMm {
+  Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+  void include(Vec3 p) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = p[a] < lo[a] ? p[a] : lo[a];
+      hi[a] = p[a] > hi[a] ? p[a] : hi[a];
+    }
+  }
+};
+/// Of the points that triangles use.
+[[nodiscard]] BoxMm bounds_of(const TriangleSoup& soup);
+
 /// Rounds coordinates to float; unused points are left out.
 [[nodiscard]] TriMesh mesh_of(const TriangleSoup& soup);
 
