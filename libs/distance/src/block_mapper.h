@@ -113,7 +113,7 @@ class BlockMapper {
   void descend(std::array<int, 3> at, int edge, const std::uint32_t* ids, std::size_t count, std::size_t level) {
     // Short lists are measured at once: voxels side by side, triangle after triangle. The thresholds are where the two
     // ways cost the same.
-    const std::size_t direct = edge == 2 ? 8 : edge == 4 ? 5 : edge == 8 ? 3 : 1;
+    const std::size_t direct = edge == 2 ? 6 : edge == 4 ? 4 : edge == 8 ? 2 : 1;
     if (count <= direct) {
       measure_block(at, edge, ids, count);
       return;
