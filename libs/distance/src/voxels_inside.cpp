@@ -95,30 +95,34 @@ class Openings {
       area_.push_back(std::abs(f.weight) * length(cross(f.b - f.a, f.c - f.a)) / 2);
     }
   }
-  // The fans that matter in a ball: all but some whose turns together stay below `far`.
+  // The fans near a ball, one by one, and the others together: their turns at the ball's centre, and by how much those can
+  // differ elsewhere in it.
   struct Near {
     std::vector<std::uint32_t> fans;
-    double far = 0;    // bound of those left out
-    double bound = 0;  // bound of all
+    double far_turns = 0, far_error = 0;
+    double far_bound = 0;  // of their |turns|
+    double bound = 0;      // of |turns| of all
   };
   [[nodiscard]] Near all() const {
     Near n;
     for (std::uint32_t i = 0; i < fans_.size(); ++i) n.fans.push_back(i);
     return n;
   }
-  [[nodiscard]] Near narrowed(const Near& from, Vec3 centre, double radius, double most_far) const {
-    std::vector<std::pair<double, std::uint32_t>> bounds;
+  [[nodiscard]] Near narrowed(const Near& from, Vec3 centre, double radius, double most_error) const {
     Near near;
-    near.far = near.bound = from.far;
-    for (const std::uint32_t i : from.fans) {
-      bounds.emplace_back(bound(i, centre, radius), i);
-      near.bound += bounds.back().first;
-    }
+    near.far_turns = from.far_turns;
+    near.far_error = from.far_error;
+    near.far_bound = near.bound = from.far_bound;
+    for (const std::uint32_t i : from.fans) near.bound += bound(i, centre, radius);
     if (near.bound < 0.5) return near;
-    std::sort(bounds.begin(), bounds.end());
-    for (const auto& [b, i] : bounds) {
-      if (near.fans.empty() && near.far + b < most_far) {
-        near.far += b;
+    std::vector<std::pair<double, std::uint32_t>> errors;
+    for (const std::uint32_t i : from.fans) errors.emplace_back(variation(i, centre, radius), i);
+    std::sort(errors.begin(), errors.end());
+    for (const auto& [e, i] : errors) {
+      if (near.fans.empty() && near.far_error + e < most_error) {
+        near.far_error += e;
+        near.far_turns += turns(fans_[i], centre);
+        near.far_bound += bound(i, centre, radius);
       } else {
         near.fans.push_back(i);
       }
@@ -128,16 +132,16 @@ class Openings {
   }
   // |winding - turns| > 1/2 at a point where the closed surface winds `winding` times.
   [[nodiscard]] bool inside(const Near& near, Vec3 p, int winding) const {
-    double w = winding;
+    double w = winding - near.far_turns;
     for (const std::uint32_t i : near.fans) w -= turns(fans_[i], p);
-    if (std::abs(std::abs(w) - 0.5) <= near.far) {
+    if (std::abs(std::abs(w) - 0.5) <= near.far_error + 1e-9) {
       w = winding;
       for (const Fan& f : fans_) w -= turns(f, p);
     }
     return std::abs(w) > 0.5;
   }
   [[nodiscard]] double bound(const Near& near, Vec3 p) const {
-    double sum = near.far;
+    double sum = near.far_bound;
     for (const std::uint32_t i : near.fans) {
       sum += bound(i, p, 0);
       if (sum >= 0.5) break;
@@ -150,6 +154,11 @@ class Openings {
   [[nodiscard]] double bound(std::uint32_t i, Vec3 centre, double radius) const {
     const double d = length(centre - middle_[i]) - radius - reach_[i], most = 0.5 * std::abs(fans_[i].weight);
     return d > 0 ? std::min(area_[i] / (d * d) / (4 * std::numbers::pi), most) : most;
+  }
+  // How much the turns can change within the ball: a surface element's solid angle has a gradient of at most 2 area / distance^3.
+  [[nodiscard]] double variation(std::uint32_t i, Vec3 centre, double radius) const {
+    const double d = length(centre - middle_[i]) - radius - reach_[i];
+    return d > 0 ? radius * 2 * area_[i] / (d * d * d) / (4 * std::numbers::pi) : 1e300;
   }
   [[nodiscard]] static double turns(const Fan& f, Vec3 p) { return f.weight * solid_angle(f.a, f.b, f.c, p) / (4 * std::numbers::pi); }
 

@@ -377,6 +377,31 @@ TEST(VoxelsInside, NeverLeaksWhereRowsMeetCornersAndEdges) {
   }
 }
 
+TEST(VoxelsInside, LooseTrianglesByTheWindingNumber) {
+  // A sphere in pieces, some of them away: open edges everywhere.
+  std::mt19937 random(8);
+  TriangleSoup s = test::unwelded(sphere(10, 2));
+  std::uniform_real_distribution<double> u(-0.6, 0.6);
+  for (std::size_t t = 0; t < s.triangles.size(); ++t) {
+    const Vec3 by{u(random), u(random), u(random)};
+    for (const auto v : s.triangles[t]) s.points_mm[v] += by;
+  }
+  s.triangles.resize(s.triangles.size() * 4 / 5);
+  const Frame f = frame_around(s, 34, 3);
+  const VoxelBits bits = voxels_inside(s, f);
+  int inside = 0;
+  for (int k = 0; k < f.dims[2]; ++k) {
+    for (int j = 0; j < f.dims[1]; ++j) {
+      for (int i = 0; i < f.dims[0]; ++i) {
+        const double w = std::abs(winding_number(s, f.world_from_index({double(i), double(j), double(k)})));
+        ASSERT_TRUE(std::abs(w - 0.5) < 1e-8 || bits.at(i, j, k) == (w > 0.5)) << w;
+        inside += bits.at(i, j, k) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(inside, 5000);
+}
+
 TEST(SignedDistance, AgreesWithTheWindingNumber) {
   TriangleSoup open = sphere(10, 3);
   open.triangles.resize(open.triangles.size() * 4 / 5);
