@@ -260,5 +260,9 @@ inline int start_edge(double density) {
   }
   return best_edge;
 }
+inline int start_edge(const TriangleTree::Data& tree, const Frame& frame) {
+  const double face = std::cbrt(frame.voxel_volume_mm3()) / tree.unit_mm;
+  return start_edge(tree.area > 0 ? std::max(1e-6, tree.view.triangles / (tree.area / (face * face))) : 1.0);
+}
 
 }  // namespace osteo

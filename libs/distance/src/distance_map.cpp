@@ -72,8 +72,7 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
   const auto& dims = frame_.dims;
   const auto blocks = [&](std::size_t a) { return static_cast<std::size_t>((dims[a] + kBlock - 1) / kBlock); };
   const std::size_t rows = blocks(1) * blocks(2);
-  const double face = std::cbrt(frame_.voxel_volume_mm3()) / tree.unit_mm;
-  const int edge = start_edge(tree.area > 0 ? std::max(1e-6, tree.view.triangles / (tree.area / (face * face))) : 1.0);
+  const int edge = start_edge(tree, frame_);
   std::vector<BlockResult> results(rows);
   std::atomic<std::size_t> done{0};
   parallel_for(rows, 1, context.threads, [&](std::size_t begin, std::size_t end) {

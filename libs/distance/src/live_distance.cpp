@@ -192,8 +192,7 @@ void LiveDistance::measure(std::array<int, 3> lo, std::array<int, 3> hi, const V
   thread_local std::unique_ptr<BlockScratch> scratch;
   if (scratch == nullptr) scratch = std::make_unique<BlockScratch>();
   BlockMapper mapper(data, frame_, *scratch);
-  const double face = std::cbrt(frame_.voxel_volume_mm3()) / data.unit_mm;
-  const int edge = start_edge(data.area > 0 ? std::max(1e-6, data.view.triangles / (data.area / (face * face))) : 1.0);
+  const int edge = start_edge(data, frame_);
   std::uint32_t hint = 0;
   for (int z = lo[2]; z < hi[2]; z += kBlock) {
     for (int y = lo[1]; y < hi[1]; y += kBlock) {

@@ -9,14 +9,17 @@ namespace osteo {
 
 SignedDistance::SignedDistance(const TriangleSoup& soup, const Context& context) : tree_(soup, context) {
   Ordered mended;
-  surface_ = is_closed(soup) ? soup : welded(soup);
+  // Welding leaves the triangles where they are: rays and distances share one tree.
+  ray_tree_ = tree_;
+  surface_ = soup;
+  if (!is_closed(surface_)) surface_ = welded(soup);
   if (!is_closed(surface_)) {
     mended = ordered(soup, context);
     surface_ = mended.soup;
+    ray_tree_ = surface_.triangles.empty() ? TriangleTree() : TriangleTree(surface_, context);
   }
   fans_ = closing_fans(mended, surface_.points_mm);
   closed_ = fans_.empty();
-  if (!surface_.triangles.empty()) ray_tree_ = TriangleTree(surface_, context);
 }
 
 SignedDistance::Answer SignedDistance::at(Vec3 p, std::uint32_t hint) const {

@@ -112,7 +112,6 @@ class Stuffer {
   // that its edges are cut no more.
   void warp() {
     const float near = 2.0F;
-    std::vector<std::pair<std::size_t, Vec3>> moved;
     for (int z = 0; z < l_.n[2]; ++z) {
       for (int y = z & 1; y < l_.n[1]; y += 2) {
         for (int x = z & 1; x < l_.n[0]; x += 2) {
