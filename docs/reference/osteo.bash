@@ -20,6 +20,8 @@ _osteo() {
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
+    "rehearse --shape") COMPREPLY=($(compgen -W "ball cylinder taper " -- "$cur")); return ;;
+    "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
@@ -49,7 +51,7 @@ _osteo() {
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --side --seconds --rate-hz --fast --resume" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --show-settings --side --seconds --rate-hz --fast --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;

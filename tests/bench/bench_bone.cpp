@@ -21,7 +21,6 @@
 #include "bench.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/grid/resample.h"
-#include "osteo/haptics/contact.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
 #include "osteo/io/vtk_data.h"
@@ -230,60 +229,12 @@ void bench_surface(const Context& context) {
       1000 * times[200], 1000 * times[395], 1000 * rebuild);
 }
 
-void bench_contact() {
-  std::printf(
-      "\n## Contact by volume sampling: burr 1 mm deep in flat bone\n\n| burr mm | voxels mm | us a tick (force + removal) | depth error, "
-      "mean mm | worst mm |\n|---|---|---|---|---|\n");
-  for (const double h : {0.2, 0.5, 1.0}) {
-    Frame f;
-    f.dims = {static_cast<int>(24 / h), static_cast<int>(24 / h), static_cast<int>(12 / h)};
-    f.spacing_mm = {h, h, h};
-    std::vector<Ijk> bricks;
-    for (int k = 0; k <= f.dims[2] / 8; ++k)
-      for (int j = 0; j <= f.dims[1] / 8; ++j)
-        for (int i = 0; i <= f.dims[0] / 8; ++i) bricks.push_back({i, j, k});
-    BrickGrid bone(f, bricks);
-    const double top = 8.137;
-    for (int k = 0; k < f.dims[2]; ++k)
-      for (int j = 0; j < f.dims[1]; ++j)
-        for (int i = 0; i < f.dims[0]; ++i)
-          bone.set(bone.find(i, j, k), static_cast<float>(std::clamp((top - (k - 0.5) * h) / h, 0.0, 1.0)));
-    for (const int tool : {1, 3, 5}) {
-      const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
-      const double depth = std::min(1.0, radius);
-      VolumeSampling model({});
-      std::mt19937 random(2);
-      std::uniform_real_distribution<double> at(8, 14);
-      double mean = 0, worst = 0;
-      DeviceSample pose;
-      pose.tool = static_cast<std::uint8_t>(tool);
-      pose.axis = {0.6F, 0, 0.8F};
-      for (int n = 0; n < 500; ++n) {
-        pose.position_mm = {static_cast<float>(at(random)), static_cast<float>(at(random)), static_cast<float>(top + radius - depth)};
-        const double e = std::abs(model.contact(bone, pose).depth_mm - depth);
-        mean += e / 500;
-        worst = std::max(worst, e);
-      }
-      BrickGrid copy = bone;
-      double removed = 0;
-      const double s = seconds([&] {
-        for (int n = 0; n < 2000; ++n) {
-          model.contact(copy, pose);
-          model.remove(copy, 1e-6, removed);
-        }
-      });
-      std::printf("| %g | %g | %.1f | %.4f | %.4f |\n", 2 * radius, h, s / 2000 * 1e6, mean, worst);
-    }
-  }
-}
-
 }  // namespace
 
 void bench_bone(const Context& context) {
   openvdb::initialize();
   bench_resample(context);
   bench_surface(context);
-  bench_contact();
 }
 
 }  // namespace osteo

@@ -17,6 +17,9 @@ struct WindowCommand {
     std::string out;
     BurrKind burr = BurrKind::cutting;
     double diameter_mm = 4;
+    BurrShape shape = BurrShape::ball;
+    ContactMethod contact = ContactMethod::overlap;
+    std::string settings;
     double rate_hz = 1000;
     std::string resume;
     int width = 1360;
@@ -26,6 +29,9 @@ struct WindowCommand {
     visit({"out", "folder for the first session (empty: a new one in CASE/sessions)"}, p.out);
     visit({"burr", "kind of burr at the start"}, p.burr);
     visit({"diameter_mm", "of the burr at the start", "mm", 1, 7}, p.diameter_mm);
+    visit({"shape", "of the burr at the start"}, p.shape);
+    visit({"contact", "how the burr feels bone"}, p.contact);
+    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit({"width", "of the window", "pixels", 640, 8192}, p.width);
@@ -43,13 +49,16 @@ struct WindowCommand {
     const Case the_case = load_case(io.arguments[0]);
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
-    const int tool = burr_index(p.burr, p.diameter_mm);
+    const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
 
     SessionFolder session;
     std::unique_ptr<Rehearsal> rehearsal;
     std::filesystem::path next_folder = p.out, resume_from = p.resume;
     RehearsalOptions options;
     options.rate_hz = p.rate_hz;
+    options.haptics.device = MouseDevice().traits();
+    options.haptics.params.contact.method = p.contact;
+    apply_haptic_settings(the_case.folder, p.settings, options.haptics);
 
     WindowActions actions;
     actions.begin = [&](bool from_case) {
@@ -57,7 +66,9 @@ struct WindowCommand {
       session = create_session_folder(std::exchange(next_folder, {}), the_case.folder, from);
       options.session_file = session.stream();
       rehearsal.reset();
-      rehearsal = std::make_unique<Rehearsal>(bone_at_begin(session), std::make_unique<MouseDevice>(), options, io.context);
+      BrickGrid bone = bone_at_begin(session);
+      if (options.haptics.hardness) options.hardness = hardness_of(the_case, bone);
+      rehearsal = std::make_unique<Rehearsal>(std::move(bone), std::make_unique<MouseDevice>(), options, io.context);
       rehearsal->start();
     };
     actions.save = [&] {

@@ -4,6 +4,7 @@
 
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
+#include "osteo/haptics/contact.h"
 #include "osteo/image/bone_threshold.h"
 #include "osteo/image/crop.h"
 
@@ -129,6 +130,10 @@ struct RehearseCommand {
     std::string out;
     BurrKind burr = BurrKind::cutting;
     double diameter_mm = 4;
+    BurrShape shape = BurrShape::ball;
+    ContactMethod contact = ContactMethod::overlap;
+    std::string settings;
+    bool show_settings = false;
     Side side = Side::left;
     double seconds = 60;
     double rate_hz = 1000;
@@ -141,6 +146,10 @@ struct RehearseCommand {
     visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
     visit({"burr", "kind of burr at the start"}, p.burr);
     visit({"diameter_mm", "of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
+    visit({"shape", "of the burr at the start"}, p.shape);
+    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
+    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"}, p.show_settings);
     visit({"side", "of the patient, for the built-in strokes"}, p.side);
     visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);

@@ -143,7 +143,8 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
     if (j.is_discarded())
       throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
   } else {
-    static constexpr std::array kAny{DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture};
+    static constexpr std::array kAny{DataKind::image,   DataKind::labels, DataKind::grid,
+                                     DataKind::surface, DataKind::tets,   DataKind::picture};
     j["file"] = path.string();
     j.update(describe_data(load_data(path, kAny, io.context)));
   }

@@ -23,7 +23,8 @@ cli::Program make_osteo_program() {
       "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB and zlib (all "
       "permissive or MPL-2.0)";
   if (const std::string parts(copyleft_parts()); !parts.empty()) {
-    p.licence += ",\nand " + parts + ", so that as a whole it falls under the " + (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
+    p.licence += ",\nand " + parts + ", so that as a whole it falls under the " +
+                 (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
                  "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF for one that does not.\n";
   } else {
     p.licence += ";\nit contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n";

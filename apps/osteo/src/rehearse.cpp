@@ -16,6 +16,7 @@
 #include "osteo/scene/case.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/scene/session_folder.h"
+#include "osteo/session/haptic_settings.h"
 #include "osteo/session/script_file.h"
 #include "osteo/view/snapshot.h"
 
@@ -33,7 +34,10 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
   std::vector<std::string> args{program.string(), io.arguments[0],
                                 "--burr",         std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(p.burr)]),
                                 "--diameter-mm",  format_number(p.diameter_mm),
+                                "--shape",        std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(p.shape)]),
+                                "--contact",      std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(p.contact)]),
                                 "--rate-hz",      format_number(p.rate_hz)};
+  if (!p.settings.empty()) args.insert(args.end(), {"--settings", p.settings});
   if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
   if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
   std::vector<char*> argv;
@@ -56,7 +60,14 @@ cli::CommandInfo RehearseCommand::info() {
 }
 
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
-  const int tool = burr_index(p.burr, p.diameter_mm);
+  const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
+  if (p.show_settings) {
+    HapticSetup setup;
+    setup.params.contact.method = p.contact;
+    apply_haptic_settings(io.arguments[0], p.settings, setup);
+    io.out << haptic_settings_json(setup);
+    return 0;
+  }
   if (!p.headless) return open_window(p, io);
   const Case the_case = load_case(io.arguments[0]);
   io.context.progress(0, "loading");
@@ -80,7 +91,12 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   RehearsalOptions options;
   options.rate_hz = p.rate_hz;
   options.session_file = session.stream();
-  Rehearsal rehearsal(std::move(bone), std::make_unique<ScriptedDevice>(script, p.rate_hz), options, io.context);
+  auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
+  options.haptics.device = device->traits();
+  options.haptics.params.contact.method = p.contact;
+  apply_haptic_settings(the_case.folder, p.settings, options.haptics);
+  if (options.haptics.hardness) options.hardness = hardness_of(the_case, bone);
+  Rehearsal rehearsal(std::move(bone), std::move(device), options, io.context);
   RehearsalSummary s;
   if (p.fast) {
     s = rehearsal.run_to_end(io.context);
@@ -133,7 +149,9 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const Session session = read_session(folder.stream());
   BrickGrid bone = bone_at_begin(folder);
-  const ReplayResult r = replay(session, bone, io.context);
+  std::shared_ptr<const Hardness> hardness;
+  if (session.header.haptics.hardness) hardness = hardness_of(load_case(folder.case_folder), bone);
+  const ReplayResult r = replay(session, bone, hardness, io.context);
   if (!p.surface_out.empty()) {
     if (fs::exists(p.surface_out) && !io.common.force)
       throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");

@@ -8,27 +8,78 @@
 #include "osteo/base/param.h"
 
 namespace osteo {
+namespace {
+
+constexpr double kShaftDiameterMm = 2.35, kShaftLengthMm = 60;
+
+float efficiency_at(const Burr& burr, double sine_of_latitude) {
+  const double latitude = std::asin(std::clamp(std::abs(sine_of_latitude), 0.0, 1.0));
+  return static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n));
+}
+
+std::array<float, 3> floats(Vec3 v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
+}  // namespace
 
 std::string Burr::name() const {
-  return std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]) + " " + format_number(diameter_mm) + " mm";
+  const std::string form = shape == BurrShape::ball ? "" : std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(shape)]) + " ";
+  return std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]) + " " + form + format_number(diameter_mm) + " mm";
+}
+
+RoundCone Burr::head() const {
+  const double r = diameter_mm / 2;
+  if (shape == BurrShape::cylinder) return {0, 1.5 * diameter_mm, r, r};
+  if (shape == BurrShape::taper) return {0, 2 * diameter_mm, r / 2, r};
+  return {0, 0, r, r};
+}
+
+RoundCone Burr::shaft() const {
+  const RoundCone h = head();
+  const double r = std::min(kShaftDiameterMm, 0.7 * diameter_mm) / 2;
+  return {h.length_mm + h.end_radius_mm, kShaftLengthMm, r, r};
 }
 
 const std::vector<Burr>& burr_library() {
   static const std::vector<Burr> library = [] {
     std::vector<Burr> all;
-    for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
-      const double rate = kind == BurrKind::cutting ? 6 : 2, falloff = kind == BurrKind::cutting ? 3 : 0.3;
-      for (int d = 1; d <= 7; ++d) all.push_back({kind, static_cast<double>(d), rate * d / 4, falloff * d / 4});
+    for (const BurrShape shape : {BurrShape::ball, BurrShape::cylinder, BurrShape::taper}) {
+      for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
+        const double rate = kind == BurrKind::cutting ? 6 : 2, falloff = kind == BurrKind::cutting ? 3 : 0.3;
+        for (int d = 1; d <= 7; ++d) all.push_back({kind, static_cast<double>(d), rate * d / 4, falloff * d / 4, shape});
+      }
     }
     return all;
   }();
   return library;
 }
 
-int burr_index(BurrKind kind, double diameter_mm) {
+namespace {
+
+template <class ShapeOf>
+std::vector<CutDepth> cut_depths(ShapeOf shape_of) {
+  std::vector<CutDepth> all;
+  for (const Burr& b : burr_library()) all.emplace_back(shape_of(b));
+  return all;
+}
+
+}  // namespace
+
+const CutDepth& head_cut_depth(std::size_t tool) {
+  static const std::vector<CutDepth> all = cut_depths([](const Burr& b) { return b.head(); });
+  return all[tool];
+}
+
+const CutDepth& shaft_cut_depth(std::size_t tool) {
+  static const std::vector<CutDepth> all = cut_depths([](const Burr& b) { return b.shaft(); });
+  return all[tool];
+}
+
+int burr_index(BurrKind kind, double diameter_mm, BurrShape shape) {
   const auto& all = burr_library();
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all[i].kind == kind && all[i].diameter_mm == diameter_mm) return static_cast<int>(i);
+    if (all[i].kind == kind && all[i].diameter_mm == diameter_mm && all[i].shape == shape) return static_cast<int>(i);
   }
   throw Error(ExitCode::usage, "there is no burr of " + format_number(diameter_mm) + " mm",
               "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
@@ -36,25 +87,57 @@ int burr_index(BurrKind kind, double diameter_mm) {
 
 BurrSamples sample_burr(const Burr& burr) {
   constexpr double kSamples = 3000;
-  const double r = burr.diameter_mm / 2;
-  const double ball = 4.0 / 3 * std::numbers::pi * r * r * r;
-  const double pitch = std::cbrt(ball / kSamples);
+  const RoundCone head = burr.head();
+  const double r = head.largest_radius_mm(), volume = head.volume_mm3(), pitch = std::cbrt(volume / kSamples);
   BurrSamples s;
-  const int n = static_cast<int>(std::ceil(r / pitch)) + 1;
-  for (int k = -n; k <= n; ++k) {
+  const int n = static_cast<int>(std::ceil(r / pitch)) + 1, top = n + static_cast<int>(std::ceil(head.length_mm / pitch));
+  for (int k = -n; k <= top; ++k) {
     for (int j = -n; j <= n; ++j) {
       for (int i = -n; i <= n; ++i) {
         const Vec3 p{(i + 0.5) * pitch, (j + 0.5) * pitch, (k + 0.5) * pitch};
-        const double d = length(p);
-        if (d > r) continue;
-        s.offset_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
-        const double latitude = std::abs(std::numbers::pi / 2 - std::acos(std::clamp(p.z / d, -1.0, 1.0)));
-        s.efficiency.push_back(
-            static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n)));
+        if (head.distance_mm(p) > 0) continue;
+        const Vec3 inward = normalized(Vec3{0, 0, head.foot_mm(std::hypot(p.x, p.y), p.z)} - p);
+        s.offset_mm.push_back(floats(p));
+        s.inward.push_back(floats(inward));
+        s.efficiency.push_back(efficiency_at(burr, inward.z));
       }
     }
   }
-  s.sample_volume_mm3 = ball / static_cast<double>(s.offset_mm.size());
+  s.sample_volume_mm3 = volume / static_cast<double>(s.offset_mm.size());
+  return s;
+}
+
+BurrSurface sample_burr_surface(const Burr& burr, int samples) {
+  const RoundCone h = burr.head();
+  // Along the profile from tip to top by area: the zone of the tip's ball, the side, the zone of the end's ball.
+  const double b = h.slope(), a = std::sqrt(1 - b * b), r1 = h.start_radius_mm, r2 = h.end_radius_mm, pi = std::numbers::pi;
+  const double tip = 2 * pi * r1 * r1 * (1 + b), top = 2 * pi * r2 * r2 * (1 - b);
+  const double slant = h.length_mm * a, side = pi * (a * r1 + a * r2) * slant;
+  BurrSurface s;
+  s.sample_area_mm2 = (tip + side + top) / samples;
+  for (int i = 0; i < samples; ++i) {
+    const double area = (i + 0.5) * s.sample_area_mm2, angle = i * pi * (3 - std::sqrt(5.0));
+    double foot = 0, normal_z = b, radius = r1;  // a point of the surface is foot + radius * normal
+    if (area < tip) {
+      normal_z = -1 + area / (2 * pi * r1 * r1);
+    } else if (area >= tip + side) {
+      foot = h.length_mm;
+      radius = r2;
+      normal_z = b + (area - tip - side) / (2 * pi * r2 * r2);
+    } else {
+      // Area of the frustum up to the share x of the slant: side * (2 c1 x + (c2 - c1) x^2) / (c1 + c2).
+      const double c1 = r1, c2 = r2, share = (area - tip) / side * (c1 + c2);
+      const double x = std::abs(c2 - c1) < 1e-12 ? share / (2 * c1) : (-c1 + std::sqrt(c1 * c1 + (c2 - c1) * share)) / (c2 - c1);
+      foot = x * h.length_mm;
+      radius = h.radius_at_mm(foot);
+    }
+    const double flat = std::sqrt(std::max(0.0, 1 - normal_z * normal_z));
+    const Vec3 normal{flat * std::cos(angle), flat * std::sin(angle), normal_z};
+    s.offset_mm.push_back(floats(Vec3{0, 0, foot} + normal * radius));
+    s.inward.push_back(floats(-normal));
+    s.reach_mm.push_back(static_cast<float>(radius));
+    s.efficiency.push_back(efficiency_at(burr, normal_z));
+  }
   return s;
 }
 

@@ -4,6 +4,8 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/grid/grid_io.h"
+#include "osteo/session/haptic_settings.h"
 
 namespace osteo {
 namespace {
@@ -77,6 +79,23 @@ BrickGrid bone_at_end(const SessionFolder& session) {
     throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
   }
   return bone;
+}
+
+void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, HapticSetup& setup) {
+  if (!file.empty()) {
+    load_haptic_settings(file, setup);
+  } else if (fs::exists(case_folder / "haptics.json")) {
+    load_haptic_settings(case_folder / "haptics.json", setup);
+  }
+}
+
+std::shared_ptr<const Hardness> hardness_of(const Case& the_case, const BrickGrid& bone) {
+  const auto hu = the_case.files.find("hu");
+  if (hu == the_case.files.end()) {
+    throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
+                "set \"hardness\" to false, or prepare the case with its hu.vdb");
+  }
+  return std::make_shared<const Hardness>(bone, load_grid(hu->second));
 }
 
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr) {

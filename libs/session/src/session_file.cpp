@@ -38,6 +38,47 @@ std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
+// Fields under their names, as text where JSON has no number for them.
+ordered_json fields_json(const std::vector<FieldRef>& fields) {
+  ordered_json j;
+  for (const FieldRef& f : fields) j[std::string(f.doc.name)] = f.to_text();
+  return j;
+}
+void read_fields(const std::vector<FieldRef>& fields, const ordered_json& j) {
+  for (const FieldRef& f : fields) f.from_text(j.at(std::string(f.doc.name)).get<std::string>());
+}
+
+ordered_json to_json(const HapticSetup& h) {
+  HapticSetup copy = h;
+  ordered_json j;
+  j["params"] = fields_json(fields_of<HapticsParams>(copy.params));
+  j["device"] = {{"damping_n_s_per_m", h.device.damping_n_s_per_m},
+                 {"delay_s", h.device.delay_s},
+                 {"encoder_mm", h.device.encoder_mm},
+                 {"max_force_n", h.device.max_force_n},
+                 {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
+  j["hardness"] = h.hardness;
+  j["vibration"] = h.vibration_json;
+  j["curve"] = ordered_json::array();
+  for (const Vec3 p : h.curve) j["curve"].push_back({p.x, p.y, p.z});
+  const auto& c = h.curve_params;
+  j["curve_params"] = {c.stiffness_n_per_mm, c.max_force_n, c.arc_penalty, c.engage_mm, c.release_mm};
+  return j;
+}
+
+HapticSetup setup_of(const ordered_json& j) {
+  HapticSetup h;
+  read_fields(fields_of<HapticsParams>(h.params), j.at("params"));
+  const auto& d = j.at("device");
+  h.device = {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
+  h.hardness = j.at("hardness");
+  h.vibration_json = j.at("vibration");
+  for (const auto& p : j.at("curve")) h.curve.push_back({p.at(0), p.at(1), p.at(2)});
+  const auto& c = j.at("curve_params");
+  h.curve_params = {c.at(0), c.at(1), c.at(2), c.at(3), c.at(4)};
+  return h;
+}
+
 template <class T>
 void append_records(std::vector<T>& out, std::span<const std::byte> payload) {
   const std::size_t n = payload.size() / sizeof(T), before = out.size();
@@ -60,10 +101,7 @@ SessionWriter::SessionWriter(const fs::path& path, const SessionHeader& h) : pat
   j["rate_hz"] = h.rate_hz;
   j["burr_library"] = h.burr_library;
   j["tick_bytes"] = sizeof(TickRecord);
-  j["contact"] = {{"stiffness_n_per_mm", h.contact.stiffness_n_per_mm},
-                  {"soft_stiffness_n_per_mm", h.contact.soft_stiffness_n_per_mm},
-                  {"soft_depth_mm", h.contact.soft_depth_mm},
-                  {"max_force_n", h.contact.max_force_n}};
+  j["haptics"] = to_json(h.haptics);
   frame(kHeader, bytes_of(j.dump()));
 }
 
@@ -146,12 +184,11 @@ Session read_session(const fs::path& path) {
         session.header.bone_hash = j.at("bone_hash");
         session.header.rate_hz = j.at("rate_hz");
         session.header.burr_library = j.at("burr_library");
-        const auto& c = j.at("contact");
-        session.header.contact = {c.at("stiffness_n_per_mm"), c.at("soft_stiffness_n_per_mm"), c.at("soft_depth_mm"), c.at("max_force_n")};
         if (j.at("tick_bytes") != sizeof(TickRecord) || session.header.burr_library != kBurrLibraryVersion) {
           throw Error(ExitCode::corrupt, name + " was recorded by another version (" + session.header.program_version + ")",
                       "replay it with that version");
         }
+        session.header.haptics = setup_of(j.at("haptics"));
         first = false;
       } else if (head.type == kTicks) {
         append_records(session.ticks, payload);

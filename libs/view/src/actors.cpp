@@ -2,12 +2,18 @@
 
 #include <vtkActor.h>
 #include <vtkCamera.h>
+#include <vtkCellArray.h>
+#include <vtkFloatArray.h>
 #include <vtkLightKit.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
+
+#include <cmath>
+#include <numbers>
 
 namespace osteo {
 
@@ -25,6 +31,39 @@ vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data) {
   p->SetSpecular(0.12);
   p->SetSpecularPower(25);
   return actor;
+}
+
+vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {
+  // Rings from pole to pole: over the first ball up to where the side begins, then over the second.
+  constexpr int kAround = 32, kRings = 12;
+  const double b = shape.slope(), waist = std::asin(b);  // latitude of the circles where side and balls touch
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkFloatArray> normals;
+  normals->SetNumberOfComponents(3);
+  vtkNew<vtkCellArray> cells;
+  int rings = 0;
+  const auto ring = [&](double centre, double radius, double latitude) {
+    for (int a = 0; a < kAround; ++a) {
+      const double angle = 2 * std::numbers::pi * a / kAround;
+      const double n[3] = {std::cos(latitude) * std::cos(angle), std::cos(latitude) * std::sin(angle), std::sin(latitude)};
+      points->InsertNextPoint(radius * n[0], radius * n[1], centre + radius * n[2]);
+      normals->InsertNextTuple(n);
+    }
+    if (++rings == 1) return;
+    for (int a = 0; a < kAround; ++a) {
+      const vtkIdType next = (a + 1) % kAround, below = (rings - 2) * kAround, above = below + kAround;
+      const vtkIdType quad[4] = {below + a, below + next, above + next, above + a};
+      cells->InsertNextCell(4, quad);
+    }
+  };
+  constexpr double kPole = std::numbers::pi / 2;
+  for (int r = 0; r <= kRings; ++r) ring(shape.start_mm, shape.start_radius_mm, -kPole + (waist + kPole) * r / kRings);
+  for (int r = 0; r <= kRings; ++r) ring(shape.start_mm + shape.length_mm, shape.end_radius_mm, waist + (kPole - waist) * r / kRings);
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(cells);
+  data->GetPointData()->SetNormals(normals);
+  return data;
 }
 
 void set_up_scene(vtkRenderer* renderer) {

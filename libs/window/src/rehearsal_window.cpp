@@ -10,15 +10,14 @@
 
 #include <vtkActor.h>
 #include <vtkCamera.h>
-#include <vtkCylinderSource.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkOpenGLState.h>
+#include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
-#include <vtkSphereSource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -118,14 +117,7 @@ class RehearsalWindow {
 
   void make_scene() {
     set_up_scene(renderer_);
-    burr_source_->SetThetaResolution(24);
-    burr_source_->SetPhiResolution(24);
-    shaft_source_->SetResolution(20);
-    shaft_source_->SetHeight(70);
-    shaft_source_->SetCenter(0, 35, 0);  // vtk's cylinder lies along y: y is the tool's axis
-    for (auto [actor, source] : {std::pair<vtkActor*, vtkPolyDataAlgorithm*>{burr_, burr_source_}, {shaft_, shaft_source_}}) {
-      vtkNew<vtkPolyDataMapper> mapper;
-      mapper->SetInputConnection(source->GetOutputPort());
+    for (const auto& [actor, mapper] : {std::pair<vtkActor*, vtkPolyDataMapper*>{burr_, burr_mapper_}, {shaft_, shaft_mapper_}}) {
       actor->SetMapper(mapper);
       actor->SetUserMatrix(tool_matrix_);
       renderer_->AddActor(actor);
@@ -186,11 +178,25 @@ class RehearsalWindow {
     static_cast<MouseDevice&>(actions_.rehearsal().device()).set_goal(goal_);
   }
 
+  // The same burr but for one property.
+  void set_kind(BurrKind kind) {
+    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
+    set_tool(burr_index(kind, b.diameter_mm, b.shape));
+  }
+  void set_diameter(int diameter_mm) {
+    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
+    set_tool(burr_index(b.kind, diameter_mm, b.shape));
+  }
+  void set_shape(BurrShape shape) {
+    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
+    set_tool(burr_index(b.kind, b.diameter_mm, shape));
+  }
+
   void set_tool(int tool) {
     tool_ = tool;
-    const double d = burr_library()[static_cast<std::size_t>(tool)].diameter_mm;
-    burr_source_->SetRadius(d / 2);
-    shaft_source_->SetRadius(std::min(1.2, 0.35 * d));
+    const Burr& burr = burr_library()[static_cast<std::size_t>(tool)];
+    burr_mapper_->SetInputData(round_cone_surface(burr.head()));
+    shaft_mapper_->SetInputData(round_cone_surface(burr.shaft()));
   }
 
   // World point under a window position at the depth of `reference` along the view.
@@ -271,11 +277,15 @@ class RehearsalWindow {
   void place_tool(const TickRecord& tick) {
     const Vec3 axis = normalized({tick.device.axis[0], tick.device.axis[1], tick.device.axis[2]});
     const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
-    const Vec3 columns[3] = {v, axis, u};
+    const Vec3 columns[3] = {u, v, axis};
     for (int c = 0; c < 3; ++c) {
       for (int r = 0; r < 3; ++r) tool_matrix_->SetElement(r, c, columns[c][static_cast<std::size_t>(r)]);
     }
-    for (int r = 0; r < 3; ++r) tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[static_cast<std::size_t>(r)]));
+    for (int r = 0; r < 3; ++r) {
+      // At the bone's surface, not in it, however far the hand has sunk in.
+      const auto a = static_cast<std::size_t>(r);
+      tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
+    }
     tool_matrix_->Modified();
     const bool on = tick.device.drill_on != 0;
     burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
@@ -331,7 +341,7 @@ class RehearsalWindow {
     if (press.key == GLFW_KEY_DOWN) goal_.position_mm += view_direction() * 0.25;
     if (press.key == GLFW_KEY_UP) goal_.position_mm -= view_direction() * 0.25;
     if (press.repeated) return;
-    if (press.key >= GLFW_KEY_1 && press.key <= GLFW_KEY_7) set_tool(tool_ / 7 * 7 + press.key - GLFW_KEY_1);
+    if (press.key >= GLFW_KEY_1 && press.key <= GLFW_KEY_7) set_diameter(press.key - GLFW_KEY_1 + 1);
     switch (press.key) {
       case GLFW_KEY_F:
         if (in_view) bring_drill_to_bone(x, y);
@@ -356,10 +366,19 @@ class RehearsalWindow {
         quit_ = true;
         break;
       case GLFW_KEY_C:
-        set_tool(tool_ % 7);
+        set_kind(BurrKind::cutting);
         break;
       case GLFW_KEY_D:
-        set_tool(tool_ % 7 + 7);
+        set_kind(BurrKind::diamond);
+        break;
+      case GLFW_KEY_B:
+        set_shape(BurrShape::ball);
+        break;
+      case GLFW_KEY_Y:
+        set_shape(BurrShape::cylinder);
+        break;
+      case GLFW_KEY_T:
+        set_shape(BurrShape::taper);
         break;
       case GLFW_KEY_HOME:
         look_from(kFromLeft);
@@ -439,12 +458,17 @@ class RehearsalWindow {
     ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
     ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
     ImGui::Text("Burr");
-    int kind = tool_ / 7;
-    if (ImGui::RadioButton("cutting (C)", kind == 0)) set_tool(tool_ % 7);
+    const Burr& burr = burr_library()[static_cast<std::size_t>(tool_)];
+    if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) set_kind(BurrKind::cutting);
     ImGui::SameLine();
-    if (ImGui::RadioButton("diamond (D)", kind == 1)) set_tool(tool_ % 7 + 7);
-    int diameter = tool_ % 7 + 1;
-    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_tool(tool_ / 7 * 7 + diameter - 1);
+    if (ImGui::RadioButton("diamond (D)", burr.kind == BurrKind::diamond)) set_kind(BurrKind::diamond);
+    if (ImGui::RadioButton("ball (B)", burr.shape == BurrShape::ball)) set_shape(BurrShape::ball);
+    ImGui::SameLine();
+    if (ImGui::RadioButton("cyl. (Y)", burr.shape == BurrShape::cylinder)) set_shape(BurrShape::cylinder);
+    ImGui::SameLine();
+    if (ImGui::RadioButton("taper (T)", burr.shape == BurrShape::taper)) set_shape(BurrShape::taper);
+    int diameter = static_cast<int>(burr.diameter_mm);
+    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_diameter(diameter);
     ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
     ImGui::Separator();
     const double force =
@@ -457,8 +481,10 @@ class RehearsalWindow {
     ImGui::ProgressBar(share, {-1, 22}, text);
     ImGui::PopStyleColor();
     ImGui::Text("Depth of burr in bone  %.2f mm", static_cast<double>(tick.depth_mm));
+    if ((tick.flags & kShaftContact) != 0) ImGui::TextColored(ImVec4(1.0F, 0.8F, 0.35F, 1), "the shaft touches bone");
+    if ((tick.flags & kEscape) != 0) ImGui::TextColored(ImVec4(1.0F, 0.5F, 0.35F, 1), "the burr is buried in bone");
     ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
-    const double seconds = static_cast<double>(tick.tick) / 1000;
+    const double seconds = static_cast<double>(tick.tick) / rehearsal.rate_hz();
     ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
     ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
@@ -502,6 +528,7 @@ class RehearsalWindow {
                                                {"middle drag", "shifts the view"},
                                                {"Ctrl-wheel", "nearer and farther"},
                                                {"1 to 7, C, D", "burr: diameter, cutting, diamond"},
+                                               {"B, Y, T", "ball, cylinder, taper"},
                                                {"S", "screenshot into the session's folder"},
                                                {"F5", "save the session and go on"},
                                                {"R", "save the session, the bone is whole again"},
@@ -521,8 +548,7 @@ class RehearsalWindow {
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
-  vtkNew<vtkSphereSource> burr_source_;
-  vtkNew<vtkCylinderSource> shaft_source_;
+  vtkNew<vtkPolyDataMapper> burr_mapper_, shaft_mapper_;
   vtkNew<vtkActor> burr_, shaft_;
   vtkNew<vtkMatrix4x4> tool_matrix_;
   std::unique_ptr<BoneView> bone_view_;

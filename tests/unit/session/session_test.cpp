@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -32,7 +33,7 @@ SessionHeader header() {
   h.program_version = "test";
   h.bone_hash = "abc";
   h.rate_hz = 2000;
-  h.contact.stiffness_n_per_mm = 1.25;
+  h.haptics.params.contact.stiffness_n_per_mm = 1.25;
   return h;
 }
 
@@ -46,7 +47,7 @@ TEST(SessionFile, RoundTrip) {
   }
   const Session s = read_session(path);
   EXPECT_EQ(s.header.rate_hz, 2000);
-  EXPECT_EQ(s.header.contact.stiffness_n_per_mm, 1.25);
+  EXPECT_EQ(s.header.haptics.params.contact.stiffness_n_per_mm, 1.25);
   ASSERT_EQ(s.ticks.size(), 107u);
   EXPECT_EQ(s.ticks[42].device.position_mm[0], 42.0F);
   ASSERT_EQ(s.changes.size(), 2u);  // the last of each voxel
@@ -66,7 +67,9 @@ TEST(SessionFile, CutAnywhereKeepsWhatWasWholeBefore) {
   const std::string whole = read_text(path);
   const auto cut = fresh("cut2");
   std::size_t least = 1000;
-  for (std::size_t n = whole.size() - 1; n > 400; n -= 13) {
+  std::uint32_t header_bytes = 0;
+  std::memcpy(&header_bytes, whole.data() + 8, sizeof header_bytes);
+  for (std::size_t n = whole.size() - 1; n > 16 + header_bytes; n -= 13) {
     std::ofstream(cut, std::ios::binary) << whole.substr(0, n);
     const Session s = read_session(cut);
     EXPECT_FALSE(s.end.has_value());

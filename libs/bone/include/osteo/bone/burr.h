@@ -1,4 +1,4 @@
-// Drill burrs: shape as volume samples, and how much bone they remove.
+// Drill burrs: shape, and how much bone they remove.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "osteo/base/param.h"
+#include "osteo/bone/round_cone.h"
 #include "osteo/data/vec.h"
 
 namespace osteo {
@@ -16,31 +17,59 @@ struct EnumNames<BurrKind> {
   static constexpr std::array<std::string_view, 2> values{"cutting", "diamond"};
 };
 
-/// Removal of a sample at latitude L (angle from the equator seen along the burr's axis):
+enum class BurrShape : int { ball, cylinder, taper };
+template <>
+struct EnumNames<BurrShape> {
+  static constexpr std::array<std::string_view, 3> values{"ball", "cylinder", "taper"};
+};
+
+/// Removal at latitude L (angle from the equator seen along the burr's axis), at the nominal speed:
 ///   rate = force * max(0, rate_mm3_per_s_per_n - falloff * |L|)   (D. Morris 2006, section 3.2.3.6)
 /// The two constants are guesses ordered as the thesis says (cutting burrs: faster, more dependent on angle); no measured
-/// values were found. A burr of another diameter scales the rate with its diameter, as the speed of its surface does.
+/// values were found. A burr of another diameter scales the rate with its diameter, as the speed of its surface does; so
+/// does another speed. The proportions of cylinders (1.5 diameters between the centres of their domes) and tapers (half the
+/// diameter at the tip, 2 diameters long) are those usual in catalogues, not of one make.
 struct Burr {
   BurrKind kind = BurrKind::cutting;
   double diameter_mm = 4;
   double rate_mm3_per_s_per_n = 6;
   double falloff_mm3_per_s_per_n_per_rad = 3;
-  [[nodiscard]] std::string name() const;  ///< "cutting 4 mm"
+  BurrShape shape = BurrShape::ball;
+  static constexpr double kNominalRpm = 60000;
+
+  [[nodiscard]] std::string name() const;  ///< "cutting 4 mm", "diamond taper 3 mm"
+  /// The head, its tip's centre at the origin, handle along +z.
+  [[nodiscard]] RoundCone head() const;
+  /// The shaft behind it, as thick as a surgical drill's (2.35 mm) or, behind a small burr, 0.7 of the burr.
+  [[nodiscard]] RoundCone shaft() const;
 };
 
-/// The library: cutting and diamond, 1 to 7 mm. A tool is named by its index here, also in session files.
+/// The library: cutting and diamond, balls, cylinders and tapers, 1 to 7 mm. A tool is named by its index here, also in
+/// session files; the balls come first.
 [[nodiscard]] const std::vector<Burr>& burr_library();
+/// Depths of flat cuts of each burr of the library, and of its shaft; made once, at the first call.
+[[nodiscard]] const CutDepth& head_cut_depth(std::size_t tool);
+[[nodiscard]] const CutDepth& shaft_cut_depth(std::size_t tool);
 /// Error(usage) when there is none.
-[[nodiscard]] int burr_index(BurrKind kind, double diameter_mm);
+[[nodiscard]] int burr_index(BurrKind kind, double diameter_mm, BurrShape shape = BurrShape::ball);
 /// Changes whenever the library does: stored in session files, since indices would mean other burrs.
-inline constexpr int kBurrLibraryVersion = 1;
+inline constexpr int kBurrLibraryVersion = 2;
 
-/// About 3000 points of a cubic lattice inside the ball, each standing for an equal share of its volume.
+/// About 3000 points of a cubic lattice inside the head, each standing for an equal share of its volume.
 struct BurrSamples {
-  std::vector<std::array<float, 3>> offset_mm;  ///< from the centre, tool axis along +z
+  std::vector<std::array<float, 3>> offset_mm;  ///< from the tip's centre, handle along +z
+  std::vector<std::array<float, 3>> inward;     ///< unit, to the nearest point of the axis
   std::vector<float> efficiency;                ///< 0 to 1: removal rate at this latitude over the rate at the equator
   double sample_volume_mm3 = 0;
 };
 [[nodiscard]] BurrSamples sample_burr(const Burr& burr);
+
+/// Points spread evenly over the surface of the head, a spiral of equal areas.
+struct BurrSurface {
+  std::vector<std::array<float, 3>> offset_mm, inward;
+  std::vector<float> efficiency, reach_mm;  ///< reach: to the axis along `inward`
+  double sample_area_mm2 = 0;
+};
+[[nodiscard]] BurrSurface sample_burr_surface(const Burr& burr, int samples);
 
 }  // namespace osteo

@@ -1,81 +1,100 @@
-// Contact of a burr with bone, and removal: the kernel of a tick.
+// Contact of a burr with bone: from a pose to a force and to what is removed. Four methods, one interface.
 #pragma once
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "osteo/base/param.h"
 #include "osteo/bone/burr.h"
+#include "osteo/bone/hardness.h"
 #include "osteo/grid/brick_grid.h"
+#include "osteo/haptics/overlap.h"
 #include "osteo/haptics/stream.h"
 
 namespace osteo {
 
+enum class ContactMethod : int { rays, volume, overlap, proxy };
+template <>
+struct EnumNames<ContactMethod> {
+  static constexpr std::array<std::string_view, 4> values{"rays", "volume", "overlap", "proxy"};
+};
+
 struct ContactParams {
+  ContactMethod method = ContactMethod::overlap;
   double stiffness_n_per_mm = 4.0;       ///< beyond the soft start; the virtual device bears it, hand-held devices about 0.5
   double soft_stiffness_n_per_mm = 1.5;  ///< in the first soft_depth_mm of penetration
   double soft_depth_mm = 0.1;
   double max_force_n = 8;
+  double friction = 0.2;         ///< proxy: dynamic; the drill at rest on bone
+  double static_friction = 0.3;  ///< proxy: until it slips; >= friction
+
+  static void describe(ContactParams& p, auto& visit) {
+    visit({"method",
+           "rays: surface samples traced inwards; volume: samples of the volume (thesis); overlap: exact; proxy: rigid, with friction"},
+          p.method);
+    visit({"stiffness_n_per_mm", "of bone, beyond the soft start", "N/mm", 0, 100}, p.stiffness_n_per_mm);
+    visit({"soft_stiffness_n_per_mm", "of bone, at first touch", "N/mm", 0, 100}, p.soft_stiffness_n_per_mm);
+    visit({"soft_depth_mm", "how deep the soft start reaches", "mm", 0, 5}, p.soft_depth_mm);
+    visit({"max_force_n", "the contact pushes no harder", "N", 0, 100}, p.max_force_n);
+    visit({"friction", "of the resting drill on bone, while it slides (proxy)", "", 0, 3}, p.friction);
+    visit({"static_friction", "until it slides (proxy)", "", 0, 3}, p.static_friction);
+  }
+  /// Force at a depth: two slopes, continuous, capped.
+  [[nodiscard]] double force_n(double depth_mm) const noexcept {
+    const double soft = depth_mm < soft_depth_mm ? depth_mm : soft_depth_mm;
+    const double f = soft_stiffness_n_per_mm * soft + stiffness_n_per_mm * (depth_mm - soft);
+    return f < max_force_n ? f : max_force_n;
+  }
 };
 
 struct ContactResult {
   Vec3 force_n;                ///< on the tool
-  double depth_mm = 0;         ///< depth of a flat cut of the burr that holds as much bone
+  Vec3 torque_n_mm;            ///< on the tool, about its position
+  Vec3 normal;                 ///< unit, out of the bone; zero without contact or where there is no direction
+  double normal_force_n = 0;   ///< along the normal: what presses the burr into bone
+  double depth_mm = 0;         ///< depth of a flat cut of the burr that holds as much bone; proxy: how far the hand is behind the surface
   double bone_mm3 = 0;         ///< bone inside the burr
-  std::uint32_t immersed = 0;  ///< samples in bone
+  std::uint32_t immersed = 0;  ///< samples, or voxels that will be cut
+  Vec3 shown_offset_mm;        ///< from the pose to where the tool is shown: at the surface
 };
 
-/// A contact model is one way from pose to force and removal; scenes choose one.
+/// What a model hands over for removal: every voxel once.
+struct Cut {
+  std::span<const Hit> hits;
+  double weight_mm3 = 0;  ///< over all voxels under the burr, also those not listed
+  double bone_mm3 = 0;    ///< the same without efficiency
+};
+
+/// A contact model is one way from pose to force; scenes choose one. Everything is allocated when it is made.
 class ContactModel {
  public:
   virtual ~ContactModel() = default;
-  /// Force for this pose. No allocation, no exception.
+  /// Force for this pose. A pose that is not finite gives none. No allocation, no exception.
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
-  /// Removes bone for the last contact(): force * time * rate. Returns the changed voxels (valid until the next call) and
-  /// adds to `removed_mm3`.
-  virtual std::span<const VoxelChange> remove(BrickGrid& bone, double dt_s, double& removed_mm3) noexcept = 0;
+  /// What the last contact() would cut; empty when the drill was off. Valid until the next contact().
+  [[nodiscard]] virtual Cut cut(const BrickGrid& bone) noexcept = 0;
 };
 
-/// The thesis' volume sampling (section 3.2.3.4 to 3.2.3.6): each sample of the burr's volume that lies in bone pushes it
-/// towards the burr's centre with unit strength, here times the bone's density there. The sum gives the direction. The
-/// magnitude is a two-gain function of the immersed volume, taken through the depth of the spherical cap of that volume, so
-/// that stiffness is in N/mm whatever the burr; unlike the thesis' it is continuous.
-/// Removal: rate * force * time, spread over the immersed samples by their latitude; what a voxel cannot give any more is
-/// carried to the next tick. About 12 ns a sample.
-class VolumeSampling final : public ContactModel {
+/// `spacing_mm` of the bone it will meet: sizes its buffers.
+[[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm);
+
+/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight; what voxels cannot give any more
+/// is carried to the next call, so that the rate depends on neither voxels nor ticks.
+class Removal {
  public:
-  explicit VolumeSampling(const ContactParams& params);
-  ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
-  std::span<const VoxelChange> remove(BrickGrid& bone, double dt_s, double& removed_mm3) noexcept override;
+  explicit Removal(std::size_t most_hits) : changes_(most_hits) {}
+  /// `hardness` may be null. Returns the changed voxels (valid until the next call) and sets what was removed.
+  std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
+                                      const Hardness* hardness, double& removed_mm3) noexcept;
 
  private:
-  struct Tool {
-    Burr burr;
-    BurrSamples samples;
-    std::vector<std::array<float, 3>> offset_index;  // rotated to the axis, in voxels of the bone
-    std::array<float, 3> axis{};                     // for which offset_index holds
-    bool oriented = false;
-  };
-  struct Hit {
-    VoxelKey voxel;
-    float weight;  // efficiency times density
-  };
-  void orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept;
-
-  ContactParams params_;
-  std::vector<Tool> tools_;
-  Tool* tool_ = nullptr;  // of the last contact
-  std::vector<Hit> hits_;
-  std::size_t hit_count_ = 0;
-  double force_magnitude_n_ = 0, weight_sum_ = 0, density_sum_ = 0;
   double carry_mm3_ = 0;
-  // Voxel -> share, cleared after each tick: an open hash table of fixed size.
-  std::vector<VoxelKey> table_key_;
-  std::vector<float> table_share_;
-  std::vector<std::uint32_t> used_slots_;
-  std::size_t used_count_ = 0;
   std::vector<VoxelChange> changes_;
 };
 
-/// d in [0, 2r] such that a plane at depth d cuts the volume from a ball of radius r.
-[[nodiscard]] double cap_depth_mm(double volume_mm3, double radius_mm) noexcept;
+/// At most about this many voxels change in a tick: with more under the burr, their rows take turns.
+inline constexpr std::size_t kMostCutPerTick = 1024;
+/// Room for the hits of any burr of the library at this spacing.
+[[nodiscard]] std::size_t most_hits(double spacing_mm);
 
 }  // namespace osteo

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "osteo/haptics/guard.h"
 #include "osteo/haptics/stream.h"
 #include "osteo/rt/seqlock.h"
 
@@ -14,6 +15,8 @@ class Device {
   virtual ~Device() = default;
   /// The pose for this tick. `force_n` is the force of the tick before.
   virtual DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept = 0;
+  /// What the guard needs to know of it.
+  [[nodiscard]] virtual DeviceTraits traits() const { return {}; }
   /// False when the device has no more to say (end of a script).
   [[nodiscard]] virtual bool active(std::uint64_t) const noexcept { return true; }
 };
@@ -30,6 +33,7 @@ struct HandGoal {
 /// through it: mass 0.15 kg, 0.8 N/mm, critically damped, at most 6 N. Semi-implicit Euler.
 class SpringHand {
  public:
+  static DeviceTraits traits() { return {.damping_n_s_per_m = 21, .delay_s = 0, .encoder_mm = 0, .max_force_n = 100}; }
   /// Moves on by dt; the first call starts at the goal.
   DeviceSample step(const HandGoal& goal, double dt_s, Vec3 force_n) noexcept;
 
@@ -43,6 +47,7 @@ class MouseDevice final : public Device {
  public:
   void set_goal(const HandGoal& goal) noexcept { goal_.store(goal); }
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
 
  private:
   Seqlock<HandGoal> goal_;
@@ -68,6 +73,7 @@ class ScriptedDevice final : public Device {
  public:
   ScriptedDevice(Script script, double rate_hz) : script_(std::move(script)), rate_hz_(rate_hz) {}
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] bool active(std::uint64_t tick) const noexcept override { return static_cast<double>(tick) / rate_hz_ < script_.seconds(); }
 
  private:

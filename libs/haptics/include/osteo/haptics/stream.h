@@ -13,29 +13,48 @@ namespace osteo {
 
 /// What a device reports in a tick. Everything that happens follows from the sequence of these.
 struct DeviceSample {
-  std::array<float, 3> position_mm{};  ///< centre of the burr, LPS
+  std::array<float, 3> position_mm{};  ///< centre of the burr's tip, LPS
   std::array<float, 3> axis{0, 0, 1};  ///< unit, from burr to handle
   std::uint8_t drill_on = 0;
-  std::uint8_t tool = 0;  ///< index in burr_library()
-  std::uint8_t reserved[2]{};
+  std::uint8_t tool = 0;     ///< index in burr_library()
+  std::uint8_t age_ms = 0;   ///< since the device last reported; 255: longer, or unplugged
+  std::uint8_t buttons = 0;  ///< of the device, beyond the drill's
 };
 static_assert(sizeof(DeviceSample) == 28);
+
+/// What happened in a tick, as bits of TickRecord::flags.
+enum TickFlag : std::uint32_t {
+  kPoseInvalid = 1,    ///< not finite: the last good pose stood in
+  kPoseJumped = 2,     ///< farther than a hand moves in a tick: force begins again from nothing
+  kPoseStale = 4,      ///< the device has not reported for a while: force fades out
+  kForceCapped = 8,    ///< the limit of the force was reached
+  kRateCapped = 16,    ///< the limit of its rate was
+  kPassivity = 32,     ///< the passivity controller took energy out
+  kShaftContact = 64,  ///< the shaft touches bone
+  kEscape = 128,       ///< too deep for a direction of its own: pushed along the distance map
+  kCurveHeld = 256,    ///< the curve constraint holds
+};
 
 /// One tick, as it is written to session files (little endian).
 struct TickRecord {
   std::uint64_t tick = 0;
   DeviceSample device;
-  std::array<float, 3> force_n{};  ///< on the hand
-  float depth_mm = 0;              ///< equivalent penetration of the burr
-  float removed_mm3 = 0;           ///< in this tick
+  std::array<float, 3> force_n{};          ///< on the hand, after all limits
+  std::array<float, 3> torque_n_mm{};      ///< on the hand, about position_mm; devices of 3 degrees of freedom leave it out
+  std::array<float, 3> shown_offset_mm{};  ///< from position_mm to where the tool is shown: at the bone's surface
+  float normal_force_n = 0;                ///< of the burr on bone: what drives removal
+  float depth_mm = 0;                      ///< equivalent penetration of the burr
+  float removed_mm3 = 0;                   ///< in this tick
   std::uint32_t voxels_changed = 0;
-  std::uint32_t immersed_samples = 0;
+  std::uint32_t immersed = 0;  ///< voxels (or samples) of bone in the burr
+  std::uint32_t flags = 0;     ///< TickFlag
+  float energy_mj = 0;         ///< the passivity observer's: positive, the contact gave more than it took
   // Below: how the machine did. Not part of what replay must repeat.
   float work_us = 0;
   float lateness_us = 0;
-  std::uint32_t reserved = 0;
+  std::uint32_t reserved[3]{};
 };
-static_assert(sizeof(TickRecord) == 80);
+static_assert(sizeof(TickRecord) == 120);
 
 /// A voxel's new density.
 struct VoxelChange {

@@ -16,7 +16,8 @@ namespace osteo {
 
 struct RehearsalOptions {
   double rate_hz = 1000;
-  ContactParams contact;
+  HapticSetup haptics;
+  std::shared_ptr<const Hardness> hardness;  ///< where haptics.hardness is set
   std::filesystem::path session_file;  ///< empty: not recorded
   bool follow_surface = true;
 };
@@ -52,6 +53,8 @@ class Rehearsal {
   [[nodiscard]] double removed_mm3() const;
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
   [[nodiscard]] const BrickGrid& bone() const { return bone_; }
+  [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
+  [[nodiscard]] double stiffness_n_per_mm() const { return renderer_.stiffness_n_per_mm(); }
   [[nodiscard]] Device& device() { return *device_; }
   /// Calls f(surface, bricks changed since the last call) under the lock that keeps the follower away.
   void with_surface(const std::function<void(const LiveSurface&, std::span<const std::uint32_t>)>& f);
@@ -64,7 +67,7 @@ class Rehearsal {
   BrickGrid bone_;
   std::unique_ptr<Device> device_;
   RehearsalOptions options_;
-  VolumeSampling model_;
+  HapticRenderer renderer_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   StreamReader* surface_reader_ = nullptr;
@@ -94,7 +97,8 @@ struct ReplayResult {
 
 /// Runs the recorded poses through the same servo on `bone`, which is left as the session left it.
 /// Error(corrupt) when the session belongs to another bone.
-[[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, const Context& context);
+/// `hardness` as the session had it; null when its header wants none.
+[[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, std::shared_ptr<const Hardness> hardness, const Context& context);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
 /// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.

@@ -30,6 +30,11 @@ struct SessionFolder {
 /// The bone at the end of a session.
 [[nodiscard]] BrickGrid bone_at_end(const SessionFolder& session);
 
+/// Settings from `file`, or where that is empty from haptics.json of the case where there is one.
+void apply_haptic_settings(const std::filesystem::path& case_folder, const std::filesystem::path& file, HapticSetup& setup);
+/// From the HU of the case; Error(no_input) when it has none.
+[[nodiscard]] std::shared_ptr<const Hardness> hardness_of(const Case& the_case, const BrickGrid& bone);
+
 /// Writes summary.json and returns its text.
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr);
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/haptics/contact.h"
+#include "osteo/haptics/renderer.h"
 #include "osteo/haptics/stream.h"
 
 namespace osteo {
@@ -18,7 +18,7 @@ struct SessionHeader {
   std::string bone_hash;  ///< of the bone before the first tick
   double rate_hz = 1000;
   int burr_library = kBurrLibraryVersion;
-  ContactParams contact;
+  HapticSetup haptics;
 };
 
 /// How it ended.

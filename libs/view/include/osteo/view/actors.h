@@ -2,6 +2,7 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
+#include "osteo/bone/round_cone.h"
 #include "osteo/data/vec.h"
 
 class vtkActor;
@@ -12,6 +13,8 @@ namespace osteo {
 
 /// Bone under soft light. The data may be replaced later through the actor's mapper.
 [[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
+/// The surface of a round cone, its axis along +z; with normals.
+[[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
 /// Dark blue background, key, fill and head light.
 void set_up_scene(vtkRenderer* renderer);
 /// Camera that sees a ball of `radius_mm` around `centre_mm` from `eye` (unit, LPS), head up.

@@ -1,0 +1,47 @@
+// The way out of the bone, from anywhere inside it, kept true while bone is removed.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "osteo/grid/brick_grid.h"
+
+namespace osteo {
+
+/// For each block of 4^3 voxels that is bone, the nearest block that is not (mean density below a half, or outside the grid). For the
+/// deepest cases only, where a burr has no direction of its own; so blocks are fine enough: the answer is right to a block's diagonal.
+/// Bone only goes away, so distances only fall: a block that empties sends its news outwards through a queue, some blocks a tick.
+/// Memory: 5 bytes a block of the bounding box. Made in O(blocks).
+class DepthMap {
+ public:
+  static constexpr int kBlock = 4;
+  explicit DepthMap(const BrickGrid& bone);
+
+  struct Answer {
+    double depth_mm = 0;  ///< to the middle of the nearest empty block, less half a block; 0 outside bone
+    Vec3 outwards;        ///< unit; zero outside bone
+  };
+  [[nodiscard]] Answer at(Vec3 world_mm) const noexcept;
+
+  /// Notes removed voxels, then spreads the news for at most `budget` blocks. No allocation.
+  void update(const BrickGrid& bone, std::span<const VoxelKey> changed, int budget) noexcept;
+  /// True when all news has spread; then the map equals one made anew, within a block.
+  [[nodiscard]] bool settled() const { return waiting_ == 0; }
+  [[nodiscard]] std::size_t memory_bytes() const { return nearest_.size() * 5; }
+
+ private:
+  static constexpr std::int32_t kNowhere = -1;
+  [[nodiscard]] bool is_bone(const BrickGrid& bone, int i, int j, int k) const noexcept;
+  [[nodiscard]] std::int64_t distance2(std::int32_t a, std::int32_t b) const noexcept;
+  void push(std::int32_t block) noexcept;
+  void relax(std::int32_t block) noexcept;
+
+  Frame frame_;
+  int dims_[3] = {};                   // blocks, with one of air around
+  std::vector<std::int32_t> nearest_;  // number of the nearest empty block; its own number when empty
+  std::vector<std::uint8_t> queued_;
+  std::vector<std::int32_t> queue_;  // a ring
+  std::size_t head_ = 0, waiting_ = 0;
+};
+
+}  // namespace osteo

@@ -1,0 +1,111 @@
+// What stands between a computed force and a hand: limits, passivity, fading.
+#pragma once
+#include <cstdint>
+
+#include "osteo/base/param.h"
+#include "osteo/data/vec.h"
+
+namespace osteo {
+
+/// What is known of the device in the hand; from its driver, or measured.
+struct DeviceTraits {
+  double damping_n_s_per_m = 1;  ///< its own, at the tip
+  double delay_s = 0;            ///< from a pose to the force that answers it, beyond the tick
+  double encoder_mm = 0;         ///< quantum of its position
+  double max_force_n = 8;
+  double max_stiffness_n_per_mm = 1e9;
+};
+
+struct GuardParams {
+  double max_force_n = 8;
+  double max_rate_n_per_s = 4000;  ///< of the force; 0: none
+  bool passivity = true;           ///< observer and controller
+  double max_damping_n_s_per_m = 30;
+  double contact_damping_n_s_per_m = 1;
+  double jump_mm = 20;
+  double resume_s = 0.1;
+  double stale_ms = 10;
+  double fade_ms = 40;
+
+  static void describe(GuardParams& p, auto& visit) {
+    visit({"limit_force_n", "the hand never feels more", "N", 0, 100}, p.max_force_n);
+    visit({"limit_rate_n_per_s", "nor a faster change", "N/s", 0, 1e9}, p.max_rate_n_per_s);
+    visit({"passivity", "take out energy that sampling puts in"}, p.passivity);
+    visit({"limit_damping_n_s_per_m", "the passivity controller damps no more than this", "N s/m", 0, 1000}, p.max_damping_n_s_per_m);
+    visit({"contact_damping_n_s_per_m", "along the normal while in contact", "N s/m", 0, 100}, p.contact_damping_n_s_per_m);
+    visit({"jump_mm", "a pose farther away than this after one tick is a jump: force begins again from nothing", "mm", 0, 1e9}, p.jump_mm);
+    visit({"resume_s", "time over which it comes back", "s", 0, 10}, p.resume_s);
+    visit({"stale_ms", "without a report for longer than this the force fades", "ms", 1, 250}, p.stale_ms);
+    visit({"fade_ms", "time over which it does", "ms", 1, 250}, p.fade_ms);
+  }
+};
+
+/// The stiffness that a sampled wall may have in front of a device: (b + B) / (T / 2 + delay) with half of it in reserve, since that bound
+/// is of stability, not of comfort (J. Gil et al. 2004, N. Diolaiti et al. 2006; without delay and B the passivity condition of
+/// J. Colgate, G. Schenkel 1997), and no more than the device's own limit.
+[[nodiscard]] double safe_stiffness_n_per_mm(const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s);
+
+/// Passivity observer and controller (B. Hannaford, J. Ryu, IEEE T-RA 18(1), 2002) over the elastic part of a force that is held constant
+/// between ticks: the energy given is exactly the sum of F(n-1) . (x(n) - x(n-1)). When more was given than taken, damping takes the rest
+/// out. Quantised positions: what less than an encoder step can feign is let pass. Energy left over is forgotten when contact ends.
+class PassivityControl {
+ public:
+  /// The damping to add now, N s/m; 0 when nothing is to be done. `x_mm` of this tick, `elastic_n` about to be applied.
+  double update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm, double most) noexcept;
+  [[nodiscard]] double energy_mj() const { return energy_mj_; }  ///< positive: given, not yet taken out
+  /// What the controller really applied, so that the sum stays true.
+  void applied(Vec3 force_n) noexcept { last_force_n_ = force_n; }
+  void reset() noexcept { *this = {}; }
+
+ private:
+  Vec3 last_x_mm_, last_force_n_;
+  double energy_mj_ = 0;
+  bool started_ = false;
+};
+
+/// Velocity from positions that come in steps of an encoder: the difference over as many ticks as it takes to be worth more than a few
+/// steps, up to 16.
+class VelocityEstimate {
+ public:
+  Vec3 update(Vec3 x_mm, double dt_s, double encoder_mm) noexcept;
+  void reset() noexcept { count_ = 0; }
+
+ private:
+  static constexpr int kLongest = 16;
+  Vec3 history_[kLongest];
+  int next_ = 0, count_ = 0;
+};
+
+/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. No allocation. The same input
+/// gives the same bits.
+class Guard {
+ public:
+  Guard(const GuardParams& params, const DeviceTraits& device) : params_(params), device_(device) {}
+
+  struct Input {
+    Vec3 position_mm;
+    Vec3 elastic_n;     ///< of contact and constraints: what must not create energy
+    Vec3 normal;        ///< unit, of the contact; zero without
+    Vec3 effects_n;     ///< drag and vibration: a motor drives them, they may
+    double age_ms = 0;  ///< of the pose
+    bool jumped = false;
+  };
+  struct Output {
+    Vec3 force_n;
+    std::uint32_t flags = 0;
+  };
+  /// A `dt_s` that is not positive and finite stands for a millisecond.
+  Output limit(const Input& in, double dt_s) noexcept;
+  [[nodiscard]] double energy_mj() const { return passivity_.energy_mj(); }
+  [[nodiscard]] Vec3 velocity_mm_s() const { return velocity_; }
+
+ private:
+  GuardParams params_;
+  DeviceTraits device_;
+  PassivityControl passivity_;
+  VelocityEstimate estimate_;
+  Vec3 velocity_, last_force_n_;
+  double resume_ = 1;  // 0 right after a jump, 1 when the force is back
+};
+
+}  // namespace osteo

@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <cmath>
+
+#include "contact_models.h"
+
+namespace osteo {
+namespace {
+
+// With more voxels under the burr than may change in a tick, their rows take turns.
+std::vector<std::uint32_t> strides_for(double spacing_mm) {
+  std::vector<std::uint32_t> strides;
+  for (const Burr& b : burr_library()) {
+    const double voxels = b.head().volume_mm3() / (spacing_mm * spacing_mm * spacing_mm);
+    strides.push_back(static_cast<std::uint32_t>(std::max(1.0, std::ceil(voxels / kMostCutPerTick))));
+  }
+  return strides;
+}
+
+double falloff_share(const Burr& b) {
+  return b.falloff_mm3_per_s_per_n_per_rad / b.rate_mm3_per_s_per_n;
+}
+
+}  // namespace
+
+ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm)
+    : params_(params), strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
+  for (const Burr& b : burr_library()) heads_.push_back(b.head());
+  static_cast<void>(head_cut_depth(0));  // not in the servo
+}
+
+ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
+  ContactResult r;
+  last_ = {};
+  cutting_ = pose.drill_on != 0;
+  const Vec3 at = position_of(pose), axis = axis_of(pose);
+  if (!finite(at)) return r;
+  const std::size_t tool = tool_of(pose);
+  last_ = overlap_.measure(bone, heads_[tool], at, axis, cutting_, falloff_share(burr_library()[tool]), strides_[tool], phase_++);
+  r.bone_mm3 = last_.bone_mm3;
+  r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(last_.bone_mm3 / bone.frame().voxel_volume_mm3())));
+  const double pressed = length(last_.area_mm2);
+  if (!(last_.bone_mm3 > 0) || !(pressed > 0)) return r;
+  r.normal = last_.area_mm2 * (-1 / pressed);
+  const double cosine = -dot(r.normal, axis);
+  r.depth_mm = head_cut_depth(tool)(last_.sharp_mm3, cosine);
+  const double left = push_left(last_, r.depth_mm, heads_[tool]);
+  r.normal_force_n = left * params_.force_n(r.depth_mm);
+  r.force_n = r.normal * r.normal_force_n;
+  r.torque_n_mm = cross(axis, last_.area_foot_mm3) * (-r.normal_force_n / pressed);
+  // Where a rigid tool would be: the hand's depth back along the push.
+  r.shown_offset_mm = r.normal * (r.depth_mm * left);
+  return r;
+}
+
+Cut ExactOverlap::cut(const BrickGrid&) noexcept {
+  if (!cutting_) return {};
+  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3};
+}
+
+BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
+    : params_(params), spacing_mm_(spacing_mm), strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
+  for (const Burr& b : burr_library()) heads_.push_back(b.head());
+  static_cast<void>(head_cut_depth(0));  // not in the servo
+}
+
+ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
+  ContactResult r;
+  cutting_ = false;
+  const Vec3 at = position_of(pose);
+  axis_ = axis_of(pose);
+  if (!finite(at)) return r;
+  if (tool_ != tool_of(pose)) proxy_.forget();
+  tool_ = tool_of(pose);
+  const RoundCone& head = heads_[tool_];
+  // Contact is a cut of this depth: with none at all there would be no direction.
+  const double touch = 0.05 * spacing_mm_;
+  Vec3 where;
+  OverlapResult there;
+  const auto field = [&](Vec3 x) {
+    there = overlap_.measure(bone, head, x, axis_);
+    where = x;
+    Clearance c;
+    const double pressed = length(there.area_mm2);
+    if (!(pressed > 0)) {
+      // In air (or with bone on all sides alike: then hold on to the way back to where it came from).
+      // No voxel with bone is touched, so half a voxel further on contact is half a voxel deep at most, and undone.
+      c.value_mm = there.bone_mm3 > 0 ? -touch : 0.5 * spacing_mm_;
+      c.gradient = c.normal = there.bone_mm3 > 0 ? normalized(proxy_.position_mm() - at) : Vec3{0, 0, 1};
+      if (length(c.normal) == 0) c.gradient = c.normal = axis_;
+      return c;
+    }
+    c.normal = there.area_mm2 * (-1 / pressed);
+    c.value_mm = touch - head_cut_depth(tool_)(there.sharp_mm3, -dot(c.normal, axis_));
+    c.gradient = c.normal;
+    return c;
+  };
+  GodObjectParams g;
+  g.friction = pose.drill_on != 0 ? 0 : params_.friction;
+  g.static_friction = pose.drill_on != 0 ? 0 : params_.static_friction;
+  g.feature_mm = 0.5 * spacing_mm_;
+  g.tolerance_mm = 2e-3 * spacing_mm_;
+  g.iterations = 6;
+  const GodObject::Answer answer = proxy_.update(field, at, g);
+  const Vec3 offset = answer.proxy_mm - at;
+  r.shown_offset_mm = offset;
+  if (!answer.contact) return r;
+  r.depth_mm = length(offset);
+  const double law = params_.force_n(r.depth_mm);
+  r.force_n = normalized(offset) * law;
+  r.normal = answer.normal;
+  r.normal_force_n = std::max(0.0, dot(r.force_n, r.normal));
+  if (!(where == answer.proxy_mm)) static_cast<void>(field(answer.proxy_mm));
+  if (const double pressed = length(there.area_mm2); pressed > 0) {
+    r.torque_n_mm = cross(axis_, there.area_foot_mm3) * (-r.normal_force_n / pressed);
+  }
+  r.bone_mm3 = there.bone_mm3;
+  r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(there.bone_mm3 / bone.frame().voxel_volume_mm3())));
+  cutting_ = pose.drill_on != 0 && r.normal_force_n > 0;
+  // The teeth reach a little beyond where the proxy rests; into what they take there it sinks.
+  advance_mm_ = answer.proxy_mm - answer.normal * std::min(r.depth_mm, 0.5 * spacing_mm_);
+  return r;
+}
+
+Cut BurrProxy::cut(const BrickGrid& bone) noexcept {
+  if (!cutting_) return {};
+  const OverlapResult o =
+      overlap_.measure(bone, heads_[tool_], advance_mm_, axis_, true, falloff_share(burr_library()[tool_]), strides_[tool_], phase_++);
+  return {overlap_.hits(), o.weight_mm3, o.bone_mm3};
+}
+
+}  // namespace osteo

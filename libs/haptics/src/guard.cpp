@@ -1,0 +1,101 @@
+#include "osteo/haptics/guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/haptics/stream.h"
+
+namespace osteo {
+
+double safe_stiffness_n_per_mm(const DeviceTraits& d, double contact_damping_n_s_per_m, double tick_s) {
+  const double bound = (d.damping_n_s_per_m + contact_damping_n_s_per_m) / (tick_s / 2 + d.delay_s);
+  return std::min(0.5 * bound / 1000, d.max_stiffness_n_per_mm);
+}
+
+Vec3 VelocityEstimate::update(Vec3 x_mm, double dt_s, double encoder_mm) noexcept {
+  // The newest against the oldest that lies more than a few encoder steps away, or against as far back as is kept.
+  const double worth = 8 * encoder_mm;
+  Vec3 v{};
+  for (int back = 1; back <= count_; ++back) {
+    const Vec3 old = history_[(next_ - back + kLongest) % kLongest];
+    const Vec3 moved = x_mm - old;
+    v = moved / (back * dt_s);
+    if (length(moved) >= worth) break;
+  }
+  history_[next_] = x_mm;
+  next_ = (next_ + 1) % kLongest;
+  count_ = std::min(count_ + 1, kLongest);
+  return v;
+}
+
+double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm, double most) noexcept {
+  if (started_) energy_mj_ += dot(last_force_n_, x_mm - last_x_mm_);
+  started_ = true;
+  last_x_mm_ = x_mm;
+  if (elastic_n == Vec3{}) {
+    energy_mj_ = 0;
+    return 0;
+  }
+  // Half an encoder step at each end may be feigned.
+  const double feigned = encoder_mm * length(elastic_n), speed2 = dot(velocity_mm_s, velocity_mm_s);
+  const double least = encoder_mm > 0 ? encoder_mm / (16 * dt_s) : 1e-6;
+  if (energy_mj_ <= feigned || speed2 < least * least) return 0;
+  // Damping alpha takes alpha v^2 dt out in the tick to come: mJ = N mm; alpha in N s/mm here.
+  return std::min((energy_mj_ - feigned) / (speed2 * dt_s) * 1000, most);
+}
+
+Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
+  Output out;
+  const double dt = std::isfinite(dt_s) && dt_s > 0 ? dt_s : 1e-3;
+  if (in.jumped) {
+    estimate_.reset();
+    passivity_.reset();
+    resume_ = 0;
+    out.flags |= kPoseJumped;
+  }
+  velocity_ = estimate_.update(in.position_mm, dt, device_.encoder_mm);
+  double share = resume_;
+  if (in.age_ms > params_.stale_ms) {
+    // The hand may be anywhere by now.
+    share = std::min(share, std::max(0.0, 1 - (in.age_ms - params_.stale_ms) / params_.fade_ms));
+    resume_ = std::min(resume_, share);
+    out.flags |= kPoseStale;
+  } else if (resume_ < 1) {
+    resume_ = params_.resume_s > 0 ? std::min(1.0, resume_ + dt / params_.resume_s) : 1.0;
+    share = resume_;
+  }
+  const auto finite = [](Vec3 v) { return std::isfinite(dot(v, v)) ? v : Vec3{}; };
+  const Vec3 elastic = finite(in.elastic_n) * share;
+  Vec3 force = elastic;
+  if (!(elastic == Vec3{})) {
+    const double along = dot(velocity_, in.normal);
+    force -= in.normal * (params_.contact_damping_n_s_per_m / 1000 * along * share);
+    // Damping may slow the hand's way out, but never hold it.
+    if (const double pull = dot(force, in.normal); pull < 0) force -= in.normal * pull;
+  }
+  if (params_.passivity) {
+    const double alpha = passivity_.update(in.position_mm, elastic, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);
+    if (alpha > 0) {
+      force -= velocity_ * (alpha / 1000);
+      out.flags |= kPassivity;
+    }
+  }
+  const Vec3 effects = finite(in.effects_n) * share;
+  force += effects;
+  const double most = std::min(params_.max_force_n, device_.max_force_n);
+  if (const double n = length(force); n > most) {
+    force = force * (most / n);
+    out.flags |= kForceCapped;
+  }
+  const Vec3 change = force - last_force_n_;
+  if (const double n = length(change), allowed = params_.max_rate_n_per_s * dt; params_.max_rate_n_per_s > 0 && n > allowed) {
+    force = last_force_n_ + change * (allowed / n);
+    out.flags |= kRateCapped;
+  }
+  last_force_n_ = force;
+  passivity_.applied(force - effects);
+  out.force_n = force;
+  return out;
+}
+
+}  // namespace osteo

@@ -1,0 +1,216 @@
+// The two sampling methods of the thesis.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "contact_models.h"
+
+namespace osteo {
+namespace {
+
+constexpr std::uint32_t kTableSize = 1 << 13;  // more than twice the samples of a burr
+constexpr std::uint32_t kEmpty = BrickGrid::kNone;
+// Less bone than this in the burr gives no contact: half a sample.
+constexpr double kLeastSamples = 0.5;
+
+Mat3 world_from_tool(Vec3 axis) {
+  const Vec3 u = any_perpendicular(axis);
+  return {{u, cross(axis, u), axis}};
+}
+Vec3 vec(const std::array<float, 3>& f) {
+  return {static_cast<double>(f[0]), static_cast<double>(f[1]), static_cast<double>(f[2])};
+}
+
+}  // namespace
+
+VolumeSampling::VolumeSampling(const ContactParams& params) : params_(params) {
+  std::size_t most = 0;
+  for (const Burr& burr : burr_library()) {
+    Tool tool{sample_burr(burr), {}, {}, {}, false};
+    tool.offset_index.resize(tool.samples.offset_mm.size());
+    tool.inward_index.resize(tool.samples.offset_mm.size());
+    most = std::max(most, tool.offset_index.size());
+    tools_.push_back(std::move(tool));
+  }
+  static_cast<void>(head_cut_depth(0));  // not in the servo
+  sample_hits_.resize(most);
+  hits_.resize(most);
+  table_key_.assign(kTableSize, kEmpty);
+  table_weight_.assign(kTableSize, 0.0F);
+  used_slots_.resize(most);
+}
+
+void VolumeSampling::orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept {
+  if (tool.oriented && tool.axis == axis) return;
+  const Mat3 to_world = world_from_tool(normalized(vec(axis))), to_index = transposed(bone.frame().direction);
+  const double h = bone.frame().spacing_mm.x;
+  const auto floats = [](Vec3 v) { return std::array{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)}; };
+  for (std::size_t s = 0; s < tool.offset_index.size(); ++s) {
+    tool.offset_index[s] = floats(to_index * (to_world * vec(tool.samples.offset_mm[s])) / h);
+    tool.inward_index[s] = floats(to_index * (to_world * vec(tool.samples.inward[s])));
+  }
+  tool.axis = axis;
+  tool.oriented = true;
+}
+
+ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
+  ContactResult r;
+  const std::size_t number = tool_of(pose);
+  tool_ = &tools_[number];
+  hit_count_ = 0;
+  weight_sum_ = density_sum_ = 0;
+  cutting_ = pose.drill_on != 0;
+  const Vec3 position = position_of(pose), axis = axis_of(pose);
+  if (!finite(position)) return r;
+  orient(*tool_, bone, {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)});
+
+  const Vec3 centre = bone.frame().index_from_world(position);
+  const RoundCone head = burr_library()[number].head();
+  const double reach = (head.length_mm + head.largest_radius_mm()) / bone.frame().spacing_mm.x + 1;
+  const auto& dims = bone.frame().dims;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (centre[a] < -reach || centre[a] > dims[a] + reach) return r;
+  }
+  // Rounding to the nearest voxel, from a base that keeps the numbers positive: truncation is then floor.
+  constexpr int kBase = 512;
+  const float cx = static_cast<float>(centre.x) + (kBase + 0.5F), cy = static_cast<float>(centre.y) + (kBase + 0.5F),
+              cz = static_cast<float>(centre.z) + (kBase + 0.5F);
+  float sx = 0, sy = 0, sz = 0;
+  double density_sum = 0, weight_sum = 0;
+  const std::size_t n = tool_->offset_index.size();
+  for (std::size_t s = 0; s < n; ++s) {
+    const auto& o = tool_->offset_index[s];
+    const VoxelKey voxel =
+        bone.find(static_cast<int>(cx + o[0]) - kBase, static_cast<int>(cy + o[1]) - kBase, static_cast<int>(cz + o[2]) - kBase);
+    if (voxel == BrickGrid::kNone) continue;
+    const float density = bone.value(voxel);
+    if (density <= 0) continue;
+    const auto& push = tool_->inward_index[s];
+    sx += push[0] * density;
+    sy += push[1] * density;
+    sz += push[2] * density;
+    const float weight = density * tool_->samples.efficiency[s];
+    sample_hits_[hit_count_++] = {voxel, weight};
+    density_sum += static_cast<double>(density);
+    weight_sum += static_cast<double>(weight);
+  }
+  r.immersed = static_cast<std::uint32_t>(hit_count_);
+  if (density_sum < kLeastSamples) return r;
+  density_sum_ = density_sum * tool_->samples.sample_volume_mm3;
+  weight_sum_ = weight_sum * tool_->samples.sample_volume_mm3;
+  r.bone_mm3 = density_sum_;
+  const Vec3 sum{static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz)};
+  const Vec3 direction = bone.frame().direction * normalized(sum);
+  r.depth_mm = head_cut_depth(number)(r.bone_mm3, -dot(direction, axis));
+  // Deep inside bone the pushes cancel and there is no direction: no force rather than a random one.
+  if (length(sum) / density_sum < 1e-3) return r;
+  r.normal = direction;
+  r.normal_force_n = params_.force_n(r.depth_mm);
+  r.force_n = r.normal * r.normal_force_n;
+  r.shown_offset_mm = r.normal * r.depth_mm;
+  return r;
+}
+
+Cut VolumeSampling::cut(const BrickGrid&) noexcept {
+  if (!cutting_ || hit_count_ == 0) return {};
+  // Several samples lie in one voxel.
+  std::size_t used = 0;
+  for (std::size_t h = 0; h < hit_count_; ++h) {
+    if (sample_hits_[h].weight <= 0) continue;
+    std::uint32_t slot = (sample_hits_[h].voxel * 2654435761U) >> 19;
+    while (table_key_[slot] != kEmpty && table_key_[slot] != sample_hits_[h].voxel) slot = (slot + 1) & (kTableSize - 1);
+    if (table_key_[slot] == kEmpty) {
+      table_key_[slot] = sample_hits_[h].voxel;
+      table_weight_[slot] = 0;
+      used_slots_[used++] = slot;
+    }
+    table_weight_[slot] += sample_hits_[h].weight;
+  }
+  for (std::size_t u = 0; u < used; ++u) {
+    hits_[u] = {table_key_[used_slots_[u]], table_weight_[used_slots_[u]]};
+    table_key_[used_slots_[u]] = kEmpty;
+  }
+  return {{hits_.data(), used}, weight_sum_, density_sum_};
+}
+
+RaySampling::RaySampling(const ContactParams& params) : params_(params), hits_(kSamples * 64) {
+  for (const Burr& burr : burr_library()) tools_.push_back(sample_burr_surface(burr, kSamples));
+  static_cast<void>(head_cut_depth(0));  // not in the servo
+}
+
+ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
+  ContactResult r;
+  hit_count_ = 0;
+  weight_sum_ = density_sum_ = 0;
+  const Vec3 position = position_of(pose), axis = axis_of(pose);
+  if (!finite(position)) return r;
+  const BurrSurface& tool = tools_[tool_of(pose)];
+  const Mat3 to_index = transposed(bone.frame().direction), to_world = world_from_tool(axis);
+  const double h = bone.frame().spacing_mm.x;
+  const Vec3 centre = bone.frame().index_from_world(position);
+  const auto density = [&](Vec3 x) {
+    return bone.at(static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)),
+                   static_cast<int>(std::floor(x.z + 0.5)));
+  };
+  Vec3 push;
+  for (std::size_t s = 0; s < tool.offset_mm.size(); ++s) {
+    const Vec3 start = centre + to_index * (to_world * vec(tool.offset_mm[s])) / h;
+    if (density(start) < 0.5F) continue;
+    ++r.immersed;
+    // In half voxels towards the axis, as far as it goes in bone; the last step is cut where the density passes a half.
+    const Vec3 inward = to_index * (to_world * vec(tool.inward[s]));
+    const double reach = static_cast<double>(tool.reach_mm[s]) / h;
+    double in = reach;
+    float before = density(start);
+    VoxelKey last = BrickGrid::kNone;
+    for (double t = 0; t < reach; t += 0.5) {
+      const Vec3 x = start + inward * t;
+      const VoxelKey voxel = bone.find(static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)),
+                                       static_cast<int>(std::floor(x.z + 0.5)));
+      const float d = voxel == BrickGrid::kNone ? 0.0F : bone.value(voxel);
+      if (d < 0.5F) {
+        in = std::max(0.0, t - 0.5 * static_cast<double>((0.5F - d) / std::max(before - d, 1e-6F)));
+        break;
+      }
+      before = d;
+      if (pose.drill_on != 0 && voxel != last && hit_count_ < hits_.size()) {
+        hits_[hit_count_++] = {voxel, d * tool.efficiency[s]};
+        weight_sum_ += static_cast<double>(d * tool.efficiency[s]);
+        density_sum_ += static_cast<double>(d);
+        last = voxel;
+      }
+    }
+    push += (to_world * vec(tool.inward[s])) * (in * h);
+  }
+  const double volume = length(push) * tool.sample_area_mm2;  // penetration times area
+  if (!(volume > 0)) return r;
+  r.normal = normalized(push);
+  r.bone_mm3 = volume;
+  // On flat bone a ball's sum is pi r d^2, whatever the depth; for other shapes it is nearly the volume.
+  const Burr& burr = burr_library()[tool_of(pose)];
+  r.depth_mm = burr.shape == BurrShape::ball ? std::sqrt(volume / (std::numbers::pi * burr.diameter_mm / 2))
+                                             : head_cut_depth(tool_of(pose))(volume, -dot(r.normal, axis));
+  r.normal_force_n = params_.force_n(r.depth_mm);
+  r.force_n = r.normal * r.normal_force_n;
+  r.shown_offset_mm = r.normal * r.depth_mm;
+  return r;
+}
+
+Cut RaySampling::cut(const BrickGrid&) noexcept {
+  if (hit_count_ == 0) return {};
+  // Rays meet in the same voxels: each once, with all its weight.
+  std::sort(hits_.begin(), hits_.begin() + static_cast<std::ptrdiff_t>(hit_count_),
+            [](const Hit& a, const Hit& b) { return a.voxel < b.voxel; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < hit_count_; ++i) {
+    if (kept > 0 && hits_[kept - 1].voxel == hits_[i].voxel) {
+      hits_[kept - 1].weight += hits_[i].weight;
+    } else {
+      hits_[kept++] = hits_[i];
+    }
+  }
+  hit_count_ = kept;
+  return {{hits_.data(), kept}, weight_sum_, density_sum_};
+}
+
+}  // namespace osteo

@@ -1,0 +1,19 @@
+// How a rehearsal feels, as a JSON file.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "osteo/haptics/renderer.h"
+
+namespace osteo {
+
+/// { "osteotome_haptics": 1, "method": "proxy", "stiffness_n_per_mm": 2, ..., "hardness": true,
+///   "curve": "incision.csv", "curve_stiffness_n_per_mm": 0.5, "vibration": "measured.json" }
+/// Any field of HapticsParams under its name; what is not named keeps its value in `setup`. Files are found beside this one.
+/// Errors: usage, with the key; no_input.
+void load_haptic_settings(const std::filesystem::path& path, HapticSetup& setup);
+
+/// All fields at their values, with what they mean, as `osteo rehearse --show-settings` prints it.
+[[nodiscard]] std::string haptic_settings_json(const HapticSetup& setup);
+
+}  // namespace osteo
