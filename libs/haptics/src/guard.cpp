@@ -9,23 +9,8 @@ namespace osteo {
 
 double safe_stiffness_n_per_mm(const DeviceTraits& d, double contact_damping_n_s_per_m, double tick_s) {
   const double bound = (d.damping_n_s_per_m + contact_damping_n_s_per_m) / (tick_s / 2 + d.delay_s);
-  return std::min(0.5 * bound / 1000, d.max_stiffness_n_per_mm);
-}
-
-Vec3 VelocityEstimate::update(Vec3 x_mm, double dt_s, double encoder_mm) noexcept {
-  // The newest against the oldest that lies more than a few encoder steps away, or against as far back as is kept.
-  const double worth = 8 * encoder_mm;
-  Vec3 v{};
-  for (int back = 1; back <= count_; ++back) {
-    const Vec3 old = history_[(next_ - back + kLongest) % kLongest];
-    const Vec3 moved = x_mm - old;
-    v = moved / (back * dt_s);
-    if (length(moved) >= worth) break;
-  }
-  history_[next_] = x_mm;
-  next_ = (next_ + 1) % kLongest;
-  count_ = std::min(count_ + 1, kLongest);
-  return v;
+  const double share = d.encoder_mm > 0 ? 0.25 : 0.5;
+  return std::min(share * bound / 1000, d.max_stiffness_n_per_mm);
 }
 
 double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm, double most) noexcept {
@@ -36,8 +21,8 @@ double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, d
     energy_mj_ = 0;
     return 0;
   }
-  // Half an encoder step at each end may be feigned.
-  const double feigned = encoder_mm * length(elastic_n), speed2 = dot(velocity_mm_s, velocity_mm_s);
+  // Half an encoder step at each end of a cycle, and what adds up over a few, may be feigned.
+  const double feigned = 4 * encoder_mm * length(elastic_n), speed2 = dot(velocity_mm_s, velocity_mm_s);
   const double least = encoder_mm > 0 ? encoder_mm / (16 * dt_s) : 1e-6;
   if (energy_mj_ <= feigned || speed2 < least * least) return 0;
   // Damping alpha takes alpha v^2 dt out in the tick to come: mJ = N mm; alpha in N s/mm here.
@@ -48,12 +33,16 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   Output out;
   const double dt = std::isfinite(dt_s) && dt_s > 0 ? dt_s : 1e-3;
   if (in.jumped) {
-    estimate_.reset();
+    moving_ = false;
     passivity_.reset();
     resume_ = 0;
     out.flags |= kPoseJumped;
   }
-  velocity_ = estimate_.update(in.position_mm, dt, device_.encoder_mm);
+  // From one tick to the next, in encoder steps or not: the steps average out, while any smoothing would come late, and damping by a
+  // late velocity drives what it should damp.
+  velocity_ = moving_ ? (in.position_mm - last_x_mm_) / dt : Vec3{};
+  last_x_mm_ = in.position_mm;
+  moving_ = true;
   double share = resume_;
   if (in.age_ms > params_.stale_ms) {
     // The hand may be anywhere by now.
@@ -68,10 +57,9 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   const Vec3 elastic = finite(in.elastic_n) * share;
   Vec3 force = elastic;
   if (!(elastic == Vec3{})) {
-    const double along = dot(velocity_, in.normal);
-    force -= in.normal * (params_.contact_damping_n_s_per_m / 1000 * along * share);
     // Damping may slow the hand's way out, but never hold it.
-    if (const double pull = dot(force, in.normal); pull < 0) force -= in.normal * pull;
+    const double damping = params_.contact_damping_n_s_per_m / 1000 * dot(velocity_, in.normal) * share;
+    force -= in.normal * std::min(damping, std::max(0.0, dot(elastic, in.normal)));
   }
   if (params_.passivity) {
     const double alpha = passivity_.update(in.position_mm, elastic, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);

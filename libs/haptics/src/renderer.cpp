@@ -14,6 +14,7 @@ std::array<float, 3> floats(Vec3 v) {
 
 // Above this share of the head in bone the pushes begin to cancel; at the second the map alone gives the direction.
 constexpr double kEscapeFrom = 0.6, kEscapeAll = 0.9;
+constexpr double kFarthestMm = 1e6;  // no pose of a hand: broken, as is what is not a number
 constexpr int kMapBudget = 48;  // blocks of the distance map a tick, 5 us
 
 HapticsParams made_safe(HapticsParams p, const DeviceTraits& device, double dt_s) {
@@ -70,7 +71,7 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   bool jumped = false;
   Guard::Input in;
   in.age_ms = sample.age_ms;
-  if (!finite(position_of(sample)) || !std::isfinite(dot(axis_of(sample), axis_of(sample)))) {
+  if (!(length(position_of(sample)) < kFarthestMm)) {
     flags_ |= kPoseInvalid;
     pose.position_mm = last_good_.position_mm;
     pose.axis = last_good_.axis;

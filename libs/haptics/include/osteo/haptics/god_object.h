@@ -69,7 +69,7 @@ class GodObject {
         slipping_ = false;
         c = field(x_);
         ++a.evaluations;
-        if (c.value_mm < 0) c = settle(field, c, p.feature_mm, tolerance, a);
+        if (c.value_mm < 0) c = settle(field, c, {}, p.feature_mm, tolerance, a);
         continue;
       }
       if (i >= p.iterations && a.contact) break;
@@ -84,11 +84,11 @@ class GodObject {
       }
       slipping_ = true;
       const double move = std::min(off - drag, p.feature_mm);
-      const Vec3 before = x_;
+      const Vec3 before = x_, wall = c.normal;
       x_ += tangent * (move / off);
       c = field(x_);
       ++a.evaluations;
-      c = settle(field, c, p.feature_mm, tolerance, a);
+      c = settle(field, c, wall, p.feature_mm, tolerance, a);
       if (length(x_ - before) <= 0.1 * tolerance) break;
     }
     if (a.contact && c.value_mm > tolerance) a.contact = false;
@@ -102,7 +102,8 @@ class GodObject {
   }
 
  private:
-  static constexpr int kPushes = 64, kFreeSteps = 48, kSettles = 4;
+  static constexpr int kPushes = 64, kFreeSteps = 48, kSettles = 8;
+  static constexpr double kSameWall = 0.95, kLeastRise = 0.02;
 
   template <class Field>
   Clearance step_out(const Field& field, const Clearance& c, double longest, Answer& a) {
@@ -113,12 +114,39 @@ class GodObject {
     ++a.evaluations;
     return field(x_);
   }
-  /// Back onto the surface from near it, from either side.
+  /// Back onto the surface from near it, from either side. `slid`: the normal of the wall it slid along. Where another wall is met, the
+  /// way out of that one leads along the walls already kept, so that corners are reached in a few steps however sharp they are.
   template <class Field>
-  Clearance settle(const Field& field, Clearance c, double longest, double tolerance, Answer& a) {
+  Clearance settle(const Field& field, Clearance c, Vec3 slid, double longest, double tolerance, Answer& a) {
+    Vec3 kept[3] = {slid};
+    int count = slid == Vec3{} ? 0 : 1;
     for (int i = 0; i < kSettles && std::abs(c.value_mm) > 0.5 * tolerance; ++i) {
       if (c.value_mm > longest) break;  // over an edge: free
-      c = step_out(field, c, longest, a);
+      const double slope = length(c.gradient);
+      const Vec3 g = slope > 0 ? c.gradient / slope : Vec3{};
+      Vec3 along = g, used{};
+      bool known = false;
+      for (int k = 0; k < count; ++k) {
+        if (dot(kept[k], g) > kSameWall) {
+          known = true;
+          continue;
+        }
+        // Gram-Schmidt over at most two other walls.
+        const Vec3 other = used == Vec3{} ? kept[k] : normalized(kept[k] - used * dot(kept[k], used));
+        along -= other * dot(along, other);
+        used = other;
+      }
+      const double rise = dot(along, g);
+      if (c.value_mm < 0 && slope > 0 && rise > kLeastRise && !(used == Vec3{})) {
+        Vec3 step = along * (-c.value_mm / (slope * rise));
+        if (const double n = length(step); n > longest) step = step * (longest / n);
+        x_ += step;
+        ++a.evaluations;
+        c = field(x_);
+      } else {
+        c = step_out(field, c, longest, a);
+      }
+      if (!known && count < 3) kept[count++] = g;
     }
     return c;
   }

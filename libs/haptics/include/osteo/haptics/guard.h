@@ -41,8 +41,9 @@ struct GuardParams {
 };
 
 /// The stiffness that a sampled wall may have in front of a device: (b + B) / (T / 2 + delay) with half of it in reserve, since that bound
-/// is of stability, not of comfort (J. Gil et al. 2004, N. Diolaiti et al. 2006; without delay and B the passivity condition of
-/// J. Colgate, G. Schenkel 1997), and no more than the device's own limit.
+/// is of stability, not of comfort, and three quarters where positions come in encoder steps, which feed small cycles that only friction
+/// would end (J. Gil et al. 2004, N. Diolaiti et al. 2006; without delay and B the passivity condition of J. Colgate, G. Schenkel 1997),
+/// and no more than the device's own limit.
 [[nodiscard]] double safe_stiffness_n_per_mm(const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s);
 
 /// Passivity observer and controller (B. Hannaford, J. Ryu, IEEE T-RA 18(1), 2002) over the elastic part of a force that is held constant
@@ -61,19 +62,6 @@ class PassivityControl {
   Vec3 last_x_mm_, last_force_n_;
   double energy_mj_ = 0;
   bool started_ = false;
-};
-
-/// Velocity from positions that come in steps of an encoder: the difference over as many ticks as it takes to be worth more than a few
-/// steps, up to 16.
-class VelocityEstimate {
- public:
-  Vec3 update(Vec3 x_mm, double dt_s, double encoder_mm) noexcept;
-  void reset() noexcept { count_ = 0; }
-
- private:
-  static constexpr int kLongest = 16;
-  Vec3 history_[kLongest];
-  int next_ = 0, count_ = 0;
 };
 
 /// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. No allocation. The same input
@@ -103,9 +91,9 @@ class Guard {
   GuardParams params_;
   DeviceTraits device_;
   PassivityControl passivity_;
-  VelocityEstimate estimate_;
-  Vec3 velocity_, last_force_n_;
-  double resume_ = 1;  // 0 right after a jump, 1 when the force is back
+  Vec3 velocity_, last_x_mm_, last_force_n_;
+  bool moving_ = false;  // last_x_mm_ is of the tick before
+  double resume_ = 1;    // 0 right after a jump, 1 when the force is back
 };
 
 }  // namespace osteo

@@ -1,0 +1,335 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "osteo/haptics/renderer.h"
+#include "slab.h"
+#include "stability.h"
+
+namespace osteo {
+namespace {
+
+class Stability : public testing::TestWithParam<test::StabilityCase> {};
+
+TEST_P(Stability, RestsOnAWallOf2kNPerM) {
+  for (const double push_n : {0.3, 1.0, 3.0}) {
+    const auto r = test::push_against_wall(GetParam(), 2, true, push_n);
+    EXPECT_TRUE(r.stable) << push_n << " N: " << r.fastest_mm_s << " mm/s at the end with " << r.stiffness_n_per_mm << " N/mm";
+    // What the wall gave, at any time, beyond what it had taken.
+    EXPECT_LT(r.gained_mj, GetParam().device.late_share > 0.03 ? 1.5 : 0.5) << push_n;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Table, Stability, testing::ValuesIn(test::kStabilityCases), [](const auto& row) {
+  std::string name;
+  for (const char* c = row.param.name; *c != 0; ++c) name += std::isalnum(static_cast<unsigned char>(*c)) != 0 ? *c : '_';
+  return name;
+});
+
+// --- every tick of every hard case: finite, capped, of bounded rate and reach, the same again -----------------------------------------
+
+const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
+
+HapticSetup setup_for(ContactMethod method) {
+  HapticSetup s;
+  s.params.contact.method = method;
+  s.params.contact.stiffness_n_per_mm = 2;
+  s.device = {.damping_n_s_per_m = 2, .delay_s = 0, .encoder_mm = 0, .max_force_n = 3.3, .max_stiffness_n_per_mm = 1e9};
+  return s;
+}
+
+struct Checked {
+  HapticRenderer renderer;
+  double dt;
+  HapticSetup setup;
+  Vec3 last_force{};
+  std::uint64_t ticks = 0;
+  std::uint32_t flags = 0;
+  double removed = 0;
+  std::vector<TickRecord> records;
+
+  Checked(const HapticSetup& s, const BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, nullptr, dt_s), dt(dt_s), setup(s) {}
+
+  Vec3 step(BrickGrid& bone, const DeviceSample& sample) {
+    const auto [r, changes] = renderer.step(bone, sample);
+    const Vec3 f{r.force_n[0], r.force_n[1], r.force_n[2]};
+    EXPECT_TRUE(std::isfinite(length(f))) << ticks;
+    EXPECT_TRUE(std::isfinite(r.torque_n_mm[0] + r.torque_n_mm[1] + r.torque_n_mm[2]));
+    EXPECT_TRUE(std::isfinite(r.shown_offset_mm[0] + r.shown_offset_mm[1] + r.shown_offset_mm[2]));
+    EXPECT_LE(length(f), std::min(setup.params.guard.max_force_n, setup.device.max_force_n) * (1 + 1e-6)) << ticks;
+    EXPECT_LE(length(f - last_force), setup.params.guard.max_rate_n_per_s * dt * (1 + 1e-5) + 1e-6) << ticks;
+    EXPECT_LT(std::hypot(r.shown_offset_mm[0], r.shown_offset_mm[1], r.shown_offset_mm[2]), 120) << ticks;
+    for (const VoxelChange& c : changes) {
+      EXPECT_GE(c.density, 0);
+      EXPECT_LE(c.density, 1);
+    }
+    last_force = f;
+    flags |= r.flags;
+    removed += static_cast<double>(r.removed_mm3);
+    ++ticks;
+    records.push_back(r);
+    return f;
+  }
+};
+
+template <class Inside>
+BrickGrid solid(double h, double half_mm, Vec3 origin, Inside inside) {
+  Frame f;
+  const int n = static_cast<int>(std::ceil(2 * half_mm / h / 8)) * 8;
+  f.dims = {n, n, n};
+  f.spacing_mm = {h, h, h};
+  const double lo = -n * h / 2 + h / 2;
+  f.origin_mm = origin + Vec3{lo, lo, lo};
+  std::vector<Ijk> bricks;
+  for (int k = 0; k < n / 8; ++k)
+    for (int j = 0; j < n / 8; ++j)
+      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
+  BrickGrid g(f, bricks);
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        int in = 0;
+        for (int s = 0; s < 64; ++s)
+          in +=
+              inside(Vec3{lo + (i + ((s & 3) - 1.5) / 4) * h, lo + (j + ((s >> 2 & 3) - 1.5) / 4) * h, lo + (k + ((s >> 4) - 1.5) / 4) * h})
+                  ? 1
+                  : 0;
+        g.set(g.find(i, j, k), static_cast<float>(in) / 64);
+      }
+  return g;
+}
+
+struct HardCase {
+  const char* name;
+  bool (*inside)(Vec3);
+  Vec3 from, to;  ///< where the hand goes, on a spring
+  bool drill;
+  double origin;  ///< of everything, along each axis
+};
+const HardCase kHardCases[] = {
+    {"thin_shell", [](Vec3 p) { return std::abs(p.z) < 0.5; }, {0, 0, 6}, {0.5, 0.2, -2}, false, 0},
+    {"thin_shell_drilled", [](Vec3 p) { return std::abs(p.z) < 0.5; }, {0, 0, 6}, {0.5, 0.2, -6}, true, 0},
+    {"acute_wedge", [](Vec3 p) { return p.z < 0 && std::abs(p.x) < -0.3 * p.z; }, {0.1, 0, 6}, {-0.4, 1, -4}, false, 0},
+    {"saddle", [](Vec3 p) { return p.z < 0.08 * (p.x * p.x - p.y * p.y); }, {0, 0, 6}, {1, 1, -3}, false, 0},
+    {"three_contacts", [](Vec3 p) { return p.x < -1 || p.y < -1 || p.z < -1; }, {5, 5, 5}, {-2, -2.2, -1.8}, false, 0},
+    {"slot_narrower_than_the_burr", [](Vec3 p) { return p.z < 0 && std::abs(p.x) > 1; }, {0, 0, 6}, {0.3, 0, -4}, false, 0},
+    {"bump", [](Vec3 p) { return p.z < 0 || length(p) < 1; }, {-6, 0, 4}, {6, 0.1, -1}, false, 0},
+    {"start_inside", [](Vec3 p) { return length(p) < 9; }, {2, 1, 0}, {2, 1, 0}, false, 0},
+    {"one_voxel",
+     [](Vec3 p) {
+       return std::max({std::abs(p.x - 0.25), std::abs(p.y - 0.25), std::abs(p.z - 0.25)}) < 0.25;
+     },
+     {0, 0, 5},
+     {0, 0, 0},
+     true,
+     0},
+    {"far_from_the_origin", [](Vec3 p) { return p.z < 0; }, {0, 0, 6}, {1, 0, -3}, true, 1e4},
+    {"no_bone_at_all", [](Vec3) { return false; }, {0, 0, 6}, {1, 0, -3}, true, 0},
+    {"along_the_border_of_the_grid", [](Vec3 p) { return p.x > 6; }, {9, 0, 12}, {11, 0, 0}, true, 0},
+};
+
+class HardCases : public testing::TestWithParam<std::tuple<ContactMethod, HardCase>> {};
+
+TEST_P(HardCases, StayWithinAllBounds) {
+  const auto& [method, c] = GetParam();
+  const auto bone0 = solid(0.5, 12, {c.origin, c.origin, c.origin}, c.inside);
+  std::vector<TickRecord> first;
+  for (int round = 0; round < 2; ++round) {
+    auto bone = bone0;
+    const Vec3 o{c.origin, c.origin, c.origin};
+    SimulatedDevice device({.mass_kg = 0.15, .damping_n_s_per_m = 2, .hand_damping_n_s_per_m = 3}, c.from + o);
+    device.set_axis({0.3, 0.1, std::sqrt(1 - 0.1)});
+    device.set_drill(c.drill, 3);
+    Checked run(setup_for(method), bone);
+    Vec3 force{};
+    double late_speed = 0;
+    for (std::uint64_t t = 0; t < 2500; ++t) {
+      const double s = std::min(1.0, static_cast<double>(t) / 1200);
+      device.set_hand({}, c.from + (c.to - c.from) * s + o, 0.4);
+      force = run.step(bone, device.read(t, 1e-3, force));
+      if (t > 2200) late_speed = std::max(late_speed, length(device.velocity_mm_s()));
+    }
+    // Nothing may shake at rest; the drill's own vibration and drag may.
+    if (!c.drill) {
+      EXPECT_LT(late_speed, std::string(c.name) == "start_inside" || method == ContactMethod::rays ? 60 : 8);
+    }
+    if (round == 0) {
+      first = run.records;
+    } else {
+      for (std::size_t i = 0; i < first.size(); ++i) ASSERT_EQ(std::memcmp(&first[i], &run.records[i], sizeof(TickRecord)), 0) << i;
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(All, HardCases, testing::Combine(testing::ValuesIn(kMethods), testing::ValuesIn(kHardCases)), [](const auto& row) {
+  return std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(std::get<0>(row.param))]) + "_" +
+         std::get<1>(row.param).name;
+});
+
+DeviceSample at(double x, double y, double z) {
+  DeviceSample s;
+  s.position_mm = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+  s.axis = {0.6F, 0, 0.8F};
+  s.tool = 3;
+  return s;
+}
+
+TEST(HardCase, StartedInsideTheForceLeadsOut) {
+  for (const ContactMethod method : {ContactMethod::volume, ContactMethod::overlap}) {
+    auto bone = solid(0.5, 12, {}, [](Vec3 p) { return length(p) < 9; });
+    Checked run(setup_for(method), bone);
+    for (int t = 0; t < 300; ++t) static_cast<void>(run.step(bone, at(3, 1, 0)));
+    EXPECT_GT(dot(run.last_force, normalized({3, 1, 0})), 0.8 * length(run.last_force));
+    EXPECT_GT(length(run.last_force), 1);
+    EXPECT_NE(run.flags & kEscape, 0u);
+  }
+}
+
+TEST(HardCase, AJumpOf50MmInATickBeginsAgainFromNothing) {
+  for (const ContactMethod method : kMethods) {
+    auto bone = test::slab(0.5);
+    Checked run(setup_for(method), bone);
+    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 40)));
+    const Vec3 first = run.step(bone, at(0, 0, -10));
+    EXPECT_LT(length(first), 0.1);
+    EXPECT_NE(run.records.back().flags & kPoseJumped, 0u);
+    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(bone, at(0, 0, -10)));
+    EXPECT_LT(length(run.last_force), 1.2);  // a tenth of the way back
+  }
+}
+
+TEST(HardCase, APoseThatIsNotANumberFadesTheForceAndStopsTheDrill) {
+  auto bone = test::slab(0.5);
+  Checked run(setup_for(ContactMethod::overlap), bone);
+  auto pose = at(0, 0, 1.2);
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  EXPECT_GT(length(run.last_force), 0.5);
+  pose.drill_on = 1;
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    auto broken = pose;
+    broken.position_mm[2] = bad;
+    for (int t = 0; t < 20; ++t) static_cast<void>(run.step(bone, broken));
+    EXPECT_EQ(length(run.last_force), 0);
+    EXPECT_NE(run.records.back().flags & kPoseInvalid, 0u);
+    broken = pose;
+    broken.axis[0] = bad;
+    static_cast<void>(run.step(bone, broken));
+  }
+  // The axis alone may be unusable: then it stands upright.
+  pose.drill_on = 0;
+  pose.axis = {0, 0, 0};
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  EXPECT_GT(length(run.last_force), 0.5);
+}
+
+TEST(HardCase, AnUnpluggedDeviceFadesAndRemovesNothing) {
+  auto bone = test::slab(0.5);
+  Checked run(setup_for(ContactMethod::overlap), bone);
+  auto pose = at(0, 0, 1.2);
+  pose.drill_on = 1;
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  EXPECT_GT(run.removed, 0);
+  const double removed = run.removed;
+  for (int t = 0; t < 100; ++t) {
+    pose.age_ms = static_cast<std::uint8_t>(std::min(255, 11 + t));
+    static_cast<void>(run.step(bone, pose));
+  }
+  EXPECT_EQ(run.removed, removed);
+  EXPECT_EQ(length(run.last_force), 0);
+  EXPECT_NE(run.records.back().flags & kPoseStale, 0u);
+  pose.age_ms = 0;  // plugged in again: force comes back by and by
+  const Vec3 first = run.step(bone, pose);
+  EXPECT_LT(length(first), 0.3);
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  EXPECT_GT(length(run.last_force), 0.1);
+}
+
+TEST(HardCase, BoneTakenAwayUnderTheBurrLetsGo) {
+  for (const ContactMethod method : kMethods) {
+    auto bone = test::slab(0.5);
+    Checked run(setup_for(method), bone);
+    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 3 - t * 0.02)));
+    EXPECT_GT(length(run.last_force), 0.5);
+    for (std::uint32_t v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) bone.set(v, 0);
+    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(bone, at(0, 0, 1)));
+    EXPECT_EQ(length(run.last_force), 0);
+  }
+}
+
+TEST(HardCase, AStallOfFourTicksChangesTheForceWithoutAStep) {
+  auto bone = test::slab(0.5);
+  Checked run(setup_for(ContactMethod::overlap), bone);
+  for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 3 - t * 0.01)));
+  const Vec3 before = run.last_force;
+  const Vec3 after = run.step(bone, at(0, 0, 3 - 104 * 0.01));  // the hand went on meanwhile
+  EXPECT_LT(length(after - before), 0.2);
+}
+
+TEST(HardCase, TimeGoingBackwardsOrStandingStillIsAMillisecond) {
+  Guard guard({}, {});
+  for (const double dt : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    const auto out = guard.limit({{0, 0, 1}, {0, 0, 5}, {0, 0, 1}, {}, 0, false}, dt);
+    EXPECT_TRUE(std::isfinite(length(out.force_n)));
+    EXPECT_LE(length(out.force_n), 8.001);
+  }
+}
+
+TEST(Guard, LimitsForceAndRate) {
+  GuardParams p;
+  p.max_force_n = 5;
+  p.max_rate_n_per_s = 1000;
+  Guard guard(p, {.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 3, .max_stiffness_n_per_mm = 1e9});
+  Vec3 last{};
+  for (int t = 0; t < 10; ++t) {
+    const auto out = guard.limit({{0, 0, 1}, {0, 0, 50}, {0, 0, 1}, {}, 0, false}, 1e-3);
+    EXPECT_LE(length(out.force_n - last), 1 + 1e-9);
+    EXPECT_LE(length(out.force_n), 3 + 1e-9);
+    last = out.force_n;
+  }
+  EXPECT_NEAR(last.z, 3, 1e-9);
+}
+
+TEST(Guard, StiffnessFollowsTickDelayAndDamping) {
+  const DeviceTraits plain{.damping_n_s_per_m = 1, .delay_s = 0, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
+  EXPECT_NEAR(safe_stiffness_n_per_mm(plain, 1, 1e-3), 2, 1e-9);
+  EXPECT_NEAR(safe_stiffness_n_per_mm(plain, 1, 0.5e-3), 4, 1e-9);
+  auto slow = plain;
+  slow.delay_s = 5e-3;
+  EXPECT_NEAR(safe_stiffness_n_per_mm(slow, 1, 1e-3), 1 / 5.5, 1e-3);
+  auto soft = plain;
+  soft.max_stiffness_n_per_mm = 0.4;
+  EXPECT_EQ(safe_stiffness_n_per_mm(soft, 1, 1e-3), 0.4);
+}
+
+// Anything a device may say, for a hundred thousand ticks; osteo bench haptics does a hundred million.
+TEST(Fuzz, NoForceIsEverOutOfBounds) {
+  for (const ContactMethod method : kMethods) {
+    auto bone = solid(0.5, 12, {}, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
+    Checked run(setup_for(method), bone);
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> u(-1, 1);
+    Vec3 x{0, 0, 10};
+    for (int t = 0; t < 12500; ++t) {
+      const auto dice = random() % 1000;
+      if (dice < 5) x = Vec3{u(random), u(random), u(random)} * 20;
+      x += Vec3{u(random), u(random), u(random)} * (dice < 50 ? 3 : 0.3);
+      if (length(x) > 25) x = x * 0.5;
+      auto s = at(x.x, x.y, x.z);
+      const Vec3 axis = normalized({u(random), u(random), u(random)});
+      s.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
+      s.drill_on = random() % 3 != 0;
+      s.tool = static_cast<std::uint8_t>(random() % 50);
+      s.age_ms = dice > 990 ? static_cast<std::uint8_t>(random()) : 0;
+      if (dice == 500) s.position_mm[random() % 3] = std::numeric_limits<float>::quiet_NaN();
+      if (dice == 501) s.axis[random() % 3] = std::numeric_limits<float>::infinity();
+      if (dice == 502) s.position_mm[random() % 3] = 1e30F;
+      if (dice == 503) s.axis = {};
+      static_cast<void>(run.step(bone, s));
+    }
+    EXPECT_GT(run.removed, 1);
+  }
+}
+
+}  // namespace
+}  // namespace osteo
