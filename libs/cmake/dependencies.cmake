@@ -12,6 +12,8 @@ find_package(GDCM REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(LIBARCHIVE REQUIRED IMPORTED_TARGET libarchive)
 find_package(DCMTK CONFIG REQUIRED)
+pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5)
+pkg_check_modules(HIDAPI REQUIRED IMPORTED_TARGET hidapi-hidraw)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 list(APPEND CMAKE_MODULE_PATH ${CMAKE_SYSTEM_PREFIX_PATH})
 # Debian keeps OpenVDB's find module below the library folder.

@@ -20,7 +20,8 @@ cli::Program make_osteo_program() {
   cli::Program p;
   p.about = "osteo: from a patient's CT to a bone that can be drilled and felt";
   p.licence =
-      "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB and zlib (all "
+      "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB, hidapi, HDF5 and "
+      "zlib (all "
       "permissive or MPL-2.0)";
   if (const std::string parts(copyleft_parts()); !parts.empty()) {
     p.licence += ",\nand " + parts + ", so that as a whole it falls under the " +
@@ -57,6 +58,9 @@ cli::Program make_osteo_program() {
   p.add<PrepareCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
+  p.add<ExportCommand>();
+  p.add<DevicesCommand>();
+  p.add<DoctorCommand>();
   p.add<DemoCommand>();
   p.add<BenchCommand>();
   p.add<DocsCommand>();

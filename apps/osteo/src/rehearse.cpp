@@ -16,6 +16,7 @@
 #include "osteo/scene/case.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/scene/session_folder.h"
+#include "osteo/session/export.h"
 #include "osteo/session/haptic_settings.h"
 #include "osteo/session/script_file.h"
 #include "osteo/view/snapshot.h"
@@ -175,6 +176,29 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
   }
   return r.identical ? 0 : static_cast<int>(ExitCode::failed);
+}
+
+cli::CommandInfo ExportCommand::info() {
+  return {"export",
+          "a session for other programs: CSV, HDF5 or MCAP",
+          "By the ending: .csv for spreadsheets, .h5 for MATLAB, Python and R (columns under /ticks), .mcap for Foxglove and ROS tools. "
+          "One row a "
+          "tick: pose, force, torque, removal, flags, how late the machine was.",
+          {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
+          "osteo export SESSION ticks.csv"};
+}
+
+int ExportCommand::run(const Params&, cli::Invocation& io) {
+  const SessionFolder folder = open_session_folder(io.arguments[0]);
+  const Session session = read_session(folder.stream());
+  const fs::path out = io.arguments[1];
+  if (fs::exists(out) && !io.common.force)
+    throw Error(ExitCode::cannot_write, "'" + out.string() + "' exists already", "--force replaces it");
+  export_session(session, out, io.context);
+  io.end_progress();
+  if (!io.common.quiet)
+    io.err << session.ticks.size() << " ticks written to " << out.string() << (session.end ? "" : " (the session was cut short)") << '\n';
+  return 0;
 }
 
 }  // namespace osteo

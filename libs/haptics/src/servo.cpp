@@ -10,6 +10,7 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
   auto [record, changes] = renderer_.step(bone_, device_.read(tick_, dt_s_, force_n_));
   record.tick = tick_;
   force_n_ = {static_cast<double>(record.force_n[0]), static_cast<double>(record.force_n[1]), static_cast<double>(record.force_n[2])};
+  device_.feel(force_n_, renderer_.contact().normal, renderer_.stiffness_n_per_mm());
   record.lateness_us = static_cast<float>(lateness_ns) / 1000;
   record.work_us = static_cast<float>(monotonic_ns() - begin) / 1000;
   stream_.publish(record, changes);

@@ -39,10 +39,10 @@ std::size_t Recorder::drain() {
     if (wanted > changes_buffer_.size()) changes_buffer_.resize(wanted);
     const std::size_t got = reader_.changes.pop({changes_buffer_.data(), wanted});
     total += n;
-    ticks_ += n;
     if (failure_) continue;  // keep draining, so that the servo's ring does not fill
     try {
       writer_.append({ticks_buffer_.data(), n}, {changes_buffer_.data(), got});
+      ticks_ += n;  // told only once the file has them: these survive whatever happens to this process
     } catch (const Error& e) {
       failure_ = e;
     }

@@ -204,6 +204,7 @@ Session read_session(const fs::path& path) {
     at += sizeof head + head.bytes;
   }
   if (first) throw Error(ExitCode::corrupt, name + " is not a session file, or was cut before its header ended");
+  session.torn_bytes = bytes.size() - at;
   for (std::size_t t = 0; t < session.ticks.size(); ++t) {
     if (session.ticks[t].tick != t) throw Error(ExitCode::corrupt, name + ": tick " + std::to_string(t) + " is missing");
   }

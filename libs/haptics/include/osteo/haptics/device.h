@@ -15,6 +15,10 @@ class Device {
   virtual ~Device() = default;
   /// The pose for this tick. `force_n` is the force of the tick before.
   virtual DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept = 0;
+  /// Another tool is taken up; from any thread. Devices whose samples name their tool themselves ignore it.
+  virtual void set_tool(std::uint8_t) noexcept {}
+  /// The force of this tick and the plane of contact it stems from (normal zero without), for devices that hold it longer than a tick.
+  virtual void feel(Vec3 /*force_n*/, Vec3 /*normal*/, double /*stiffness_n_per_mm*/) noexcept {}
   /// What the guard needs to know of it.
   [[nodiscard]] virtual DeviceTraits traits() const { return {}; }
   /// False when the device has no more to say (end of a script).

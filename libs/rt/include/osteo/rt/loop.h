@@ -14,14 +14,15 @@ struct LoopStats {
   Histogram work;      ///< time spent in the function
   Histogram lateness;  ///< wake-up after the planned time: the machine's share
   std::uint64_t ticks = 0;
-  std::uint64_t missed_by_work = 0;     ///< periods lost because the function took longer than a period
-  std::uint64_t missed_by_machine = 0;  ///< periods lost because the wake-up came late
+  std::uint64_t missed_by_work = 0;     ///< periods lost because the function itself ran longer than a period (by its thread's CPU time)
+  std::uint64_t missed_by_machine = 0;  ///< periods lost because the wake-up came late, or the thread was taken off its core meanwhile
   bool realtime_granted = false;
   bool memory_locked = false;
+  bool idle_states_off = false;  ///< /dev/cpu_dma_latency held at 0 while the loop runs
   std::string realtime_refusal;  ///< empty, or why
 };
 
-/// SCHED_FIFO priority 80, memory locked, absolute sleeps (clock_nanosleep). When real-time priority is refused the loop runs
+/// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps (clock_nanosleep). When real-time priority is refused the loop runs
 /// all the same with the smallest timer slack, and says so. A late tick does not shift the later ones; periods that passed
 /// meanwhile are skipped and counted.
 class FixedRateLoop {

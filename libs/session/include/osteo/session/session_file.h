@@ -56,6 +56,7 @@ struct Session {
   SessionHeader header;
   std::vector<TickRecord> ticks;
   std::vector<VoxelChange> changes;  ///< in the order written; applied in this order they give the bone at the end
+  std::uint64_t torn_bytes = 0;      ///< behind the last whole frame, left out
   std::optional<SessionEnd> end;     ///< absent when the program was stopped before it could close the file
 };
 

@@ -1,0 +1,256 @@
+// devices and doctor: what is plugged in, and what this machine can do.
+#include <sys/resource.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <thread>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/devices/devices.h"
+#include "osteo/haptics/overlap.h"
+#include "osteo/rt/loop.h"
+#include "osteo/view/offscreen.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string hex4(unsigned v) {
+  char text[8];
+  std::snprintf(text, sizeof text, "%04x", v);
+  return text;
+}
+
+std::string text_of(const SpaceMouseState& s) {
+  char text[160];
+  std::snprintf(text, sizeof text, "move %+.2f %+.2f %+.2f  turn %+.2f %+.2f %+.2f  buttons %u", s.move[0], s.move[1], s.move[2], s.turn[0],
+                s.turn[1], s.turn[2], s.buttons);
+  return text;
+}
+
+/// Decodes reports of one device into lines for people.
+class Watcher {
+ public:
+  Watcher(DeviceModel model, std::string name) : model_(model), name_(std::move(name)) {}
+
+  std::string decode(std::span<const std::byte> report) {
+    std::string text = name_ + ": ";
+    std::uint32_t pressed = 0;
+    WoodenHapticsReport w;
+    if (model_ == DeviceModel::space_mouse || model_ == DeviceModel::space_mouse_wireless) {
+      return decode_space_mouse(report, mouse_) ? text + text_of(mouse_) : text + unknown(report);
+    }
+    if (model_ == DeviceModel::woodenhaptics) {
+      if (!decode_woodenhaptics(report, w)) return text + unknown(report);
+      text += "encoders";
+      for (const int e : w.encoder) text += " " + std::to_string(e);
+      return text + (w.button ? "  button" : "");
+    }
+    return decode_pedal(model_, report, pressed) ? text + "pedals " + std::to_string(pressed) : text + unknown(report);
+  }
+  std::vector<std::string> lines;
+
+ private:
+  static std::string unknown(std::span<const std::byte> report) { return "not understood, " + std::to_string(report.size()) + " bytes"; }
+  DeviceModel model_;
+  std::string name_;
+  SpaceMouseState mouse_;
+};
+
+ordered_json quantiles(const Histogram& h) {
+  const auto us = [](double v) { return std::round(v * 10) / 10; };
+  return {{"p50_us", us(h.quantile_us(0.5))},
+          {"p99_us", us(h.quantile_us(0.99))},
+          {"p99_9_us", us(h.quantile_us(0.999))},
+          {"max_us", us(h.max_us())}};
+}
+
+std::string processor() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+cli::CommandInfo DevicesCommand::info() {
+  return {
+      "devices",
+      "haptic devices, 3D mice and pedals that are plugged in",
+      "Known are WoodenHaptics and Polhem arms, 3Dconnexion SpaceMice, Infinity and PCsensor foot pedals. With --watch their reports are "
+      "shown as they are understood.",
+      {},
+      "osteo devices --watch 5"};
+}
+
+int DevicesCommand::run(const Params& p, cli::Invocation& io) {
+  ordered_json j = ordered_json::array();
+  if (!p.recording.empty()) {
+    const HidRecording recording = load_hid_recording(p.recording);
+    const DeviceModel model = model_of(recording.info.vendor, recording.info.product);
+    Watcher w(model, std::string(name_of(model)));
+    io.end_progress();
+    for (const auto& e : recording.events) io.out << w.decode(e.report) << '\n';
+    return 0;
+  }
+  const auto found = find_devices();
+  io.end_progress();
+  for (const FoundDevice& f : found) {
+    j.push_back({{"device", std::string(name_of(f.model))},
+                 {"path", f.info.path},
+                 {"vendor", hex4(f.info.vendor)},
+                 {"product", hex4(f.info.product)},
+                 {"name", f.info.name},
+                 {"readable", f.readable}});
+    if (!f.readable) j.back()["why"] = f.why;
+    if (!io.common.json) {
+      io.out << name_of(f.model) << "  " << f.info.path << "  " << hex4(f.info.vendor) << ":" << hex4(f.info.product) << "  " << f.info.name
+             << (f.readable ? "" : "  (" + f.why + ")") << '\n';
+    }
+  }
+  if (io.common.json) io.out << j.dump(2) << '\n';
+  if (found.empty() && !io.common.json) io.out << "none of the devices known here is plugged in, or this process may not see it\n";
+  if (p.watch > 0) {
+    std::vector<std::unique_ptr<Watcher>> watchers;
+    std::vector<std::thread> threads;
+    for (const FoundDevice& f : found) {
+      if (!f.readable) continue;
+      watchers.push_back(std::make_unique<Watcher>(f.model, std::string(name_of(f.model))));
+      threads.emplace_back([&, w = watchers.back().get(), info = f.info] {
+        std::string why;
+        const auto port = open_hid(info, why);
+        std::array<std::byte, 512> buffer;
+        const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(p.watch);
+        while (port != nullptr && std::chrono::steady_clock::now() < end) {
+          const int n = port->read(buffer, 50);
+          if (n < 0) break;
+          if (n > 0) w->lines.push_back(w->decode({buffer.data(), static_cast<std::size_t>(n)}));
+        }
+      });
+    }
+    for (auto& t : threads) t.join();
+    for (const auto& w : watchers)
+      for (const auto& line : w->lines) io.out << line << '\n';
+  }
+  return 0;
+}
+
+cli::CommandInfo DoctorCommand::info() {
+  return {"doctor",
+          "what this machine can do for a rehearsal, and what to change",
+          "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code 0 also when "
+          "something is "
+          "missing: the advice says what.",
+          {},
+          "osteo doctor --seconds 10"};
+}
+
+int DoctorCommand::run(const Params& p, cli::Invocation& io) {
+  ordered_json j;
+  std::vector<std::string> advice;
+  utsname u{};
+  ::uname(&u);
+  j["processor"] = processor();
+  j["cores"] = std::thread::hardware_concurrency();
+  j["kernel"] = std::string(u.sysname) + " " + u.release;
+  j["kernel_is_realtime"] = fs::exists("/sys/kernel/realtime");
+  j["vector_instructions"] = overlap_simd_name();
+
+  io.context.progress(0.1, "measuring the loop");
+  FixedRateLoop loop(p.rate_hz, [end = monotonic_ns() + static_cast<std::int64_t>(p.seconds * 1e9)](std::int64_t) {
+    // As much work as a tick of drilling.
+    const std::int64_t until = monotonic_ns() + 50'000;
+    while (monotonic_ns() < until) {
+    }
+    return monotonic_ns() < end;
+  });
+  loop.start();
+  loop.join();
+  const LoopStats& s = loop.stats();
+  rlimit lock{};
+  ::getrlimit(RLIMIT_MEMLOCK, &lock);
+  j["realtime_priority"] = s.realtime_granted;
+  if (!s.realtime_granted) {
+    j["realtime_refusal"] = s.realtime_refusal;
+    advice.push_back("give your user 'rtprio 80' in /etc/security/limits.conf and log in again: forces stutter without real-time priority");
+  }
+  j["memory_locked"] = s.memory_locked;
+  if (!s.memory_locked) advice.push_back("give your user 'memlock unlimited' in /etc/security/limits.conf: paging makes ticks late");
+  j["processor_sleep_held_off"] = s.idle_states_off;
+  if (!s.idle_states_off)
+    advice.push_back("let your user write /dev/cpu_dma_latency (a udev rule): waking from deep sleep costs up to 0.1 ms");
+  j["loop"] = {{"rate_hz", p.rate_hz},
+               {"ticks", s.ticks},
+               {"lateness", quantiles(s.lateness)},
+               {"missed_by_work", s.missed_by_work},
+               {"missed_by_machine", s.missed_by_machine}};
+  if (s.lateness.quantile_us(0.99) > 350)
+    advice.push_back("a hundredth of the ticks is later than 0.35 ms: close other programs, or take a machine that is not shared");
+  if (s.missed_by_machine > 0 && j["kernel_is_realtime"] == false)
+    advice.push_back("ticks were lost to the machine: on a machine of your own, the package linux-image-rt-amd64 helps");
+
+  j["devices"] = ordered_json::array();
+  for (const FoundDevice& f : find_devices()) {
+    j["devices"].push_back(std::string(name_of(f.model)) + " " + f.info.path + (f.readable ? "" : " (" + f.why + ")"));
+    if (!f.readable)
+      advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" + hex4(f.info.vendor) +
+                       "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
+  }
+  try {
+    OffscreenWindow window(64, 64);
+    static_cast<void>(window.render());
+    j["opengl"] = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
+    const std::string all = j["opengl"];
+    const auto line = [&](const std::string& key) {
+      const auto at = all.find(key);
+      return at == std::string::npos ? std::string() : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
+    };
+    j["opengl"] = line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
+    if (j["opengl"].get<std::string>().find("llvmpipe") != std::string::npos)
+      advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
+  } catch (const Error& e) {
+    j["opengl"] = "none";
+    advice.push_back("there is no OpenGL: install libegl1 and libgl1-mesa-dri");
+  }
+  j["display"] = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
+  j["audio"] = fs::exists("/dev/snd");
+  if (!fs::exists("/dev/snd")) advice.push_back("there is no sound device");
+  j["advice"] = advice;
+  io.end_progress();
+  if (io.common.json) {
+    io.out << j.dump(2) << '\n';
+    return 0;
+  }
+  const auto yes = [](bool v) { return v ? "yes" : "NO"; };
+  const auto& late = j["loop"]["lateness"];
+  io.out << j["processor"].get<std::string>() << ", " << j["cores"] << " cores, " << j["kernel"].get<std::string>()
+         << (j["kernel_is_realtime"].get<bool>() ? " (real-time)" : "") << ", vectors: " << overlap_simd_name() << '\n'
+         << "real-time priority  " << yes(s.realtime_granted) << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")")
+         << '\n'
+         << "memory locked       " << yes(s.memory_locked) << '\n'
+         << "deep sleep held off " << yes(s.idle_states_off) << '\n'
+         << "loop at " << format_number(p.rate_hz) << " Hz    wake-up late p50 " << late["p50_us"] << ", p99 " << late["p99_us"]
+         << ", p99.9 " << late["p99_9_us"] << ", max " << late["max_us"] << " us over " << s.ticks << " ticks; periods missed by work "
+         << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
+         << "devices             " << (j["devices"].empty() ? "none" : "") << '\n';
+  for (const auto& d : j["devices"]) io.out << "  " << d.get<std::string>() << '\n';
+  io.out << "OpenGL              " << j["opengl"].get<std::string>() << '\n'
+         << "display             " << yes(j["display"]) << '\n'
+         << "sound               " << yes(j["audio"]) << '\n';
+  for (const auto& a : advice) io.out << "- " << a << '\n';
+  if (advice.empty()) io.out << "nothing to change\n";
+  return 0;
+}
+
+}  // namespace osteo

@@ -1,0 +1,156 @@
+// Hardware in front of the servo.
+#pragma once
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "osteo/devices/hid_link.h"
+#include "osteo/devices/woodenhaptics.h"
+#include "osteo/haptics/device.h"
+#include "osteo/rt/seqlock.h"
+
+namespace osteo {
+
+/// From the device's workspace to the scene: scene = place + rotation * scale * (device - anchor). Holding the clutch moves the device
+/// alone.
+class WorkspaceMap {
+ public:
+  /// `rotation`: columns are the device's axes in the scene. `scale` > 0: scene mm a device mm.
+  WorkspaceMap(Vec3 place_mm, const Mat3& rotation, double scale) : place_mm_(place_mm), rotation_(rotation), scale_(scale) {}
+  /// One tick; no allocation.
+  Vec3 update(Vec3 device_mm, bool clutch) noexcept {
+    if (!started_ || clutch) {
+      if (started_) place_mm_ = last_scene_mm_;
+      anchor_mm_ = device_mm;
+      started_ = true;
+    }
+    return last_scene_mm_ = place_mm_ + rotation_ * ((device_mm - anchor_mm_) * scale_);
+  }
+  [[nodiscard]] Vec3 last_mm() const { return started_ ? last_scene_mm_ : place_mm_; }
+  [[nodiscard]] Vec3 direction(Vec3 device) const { return rotation_ * device; }
+  /// A force of the scene, for the device's motors.
+  [[nodiscard]] Vec3 to_device(Vec3 scene_n) const { return transposed(rotation_) * scene_n; }
+  [[nodiscard]] double scale() const { return scale_; }
+
+ private:
+  Vec3 place_mm_, anchor_mm_, last_scene_mm_;
+  Mat3 rotation_;
+  double scale_;
+  bool started_ = false;
+};
+
+/// A force that goes on by itself for a while: what the servo last said, with the plane of contact beside it, so that a late servo is
+/// bridged.
+struct ForcePlane {
+  Vec3 force_n, position_mm, normal;  ///< in the device's frame; of the servo's tick
+  double stiffness_n_per_mm = 0;
+  std::int64_t time_ns = 0;
+};
+/// Up to `hold_ms` after the tick the contact is the plane, so that the force follows the hand; then it fades to nothing within `fade_ms`.
+/// Never more than twice the last force plus half a newton.
+[[nodiscard]] Vec3 extrapolate(const ForcePlane& plane, Vec3 position_mm, std::int64_t now_ns, double hold_ms = 5,
+                               double fade_ms = 20) noexcept;
+
+/// A pedal's state, read by its own thread.
+class FootPedal final : HidHandler {
+ public:
+  explicit FootPedal(DeviceModel model, HidLink::Open open) : model_(model), link_(std::move(open), *this, 100) {}
+  [[nodiscard]] std::uint32_t pressed() const noexcept { return pressed_; }
+  [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+
+ private:
+  void report(HidPort&, std::span<const std::byte> report) override {
+    std::uint32_t pressed = 0;
+    if (decode_pedal(model_, report, pressed)) pressed_ = pressed;
+  }
+  void gone() override { pressed_ = 0; }  // an unplugged pedal is not pressed
+  DeviceModel model_;
+  std::atomic<std::uint32_t> pressed_{0};
+  HidLink link_;
+};
+
+/// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 drills; with a pedal, that does (bit 0; bit 1
+/// changes nothing here).
+class SpaceMouseDevice final : public Device, HidHandler {
+ public:
+  /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
+  SpaceMouseDevice(HidLink::Open open, Vec3 start_mm, const Mat3& rotation, int tool, const FootPedal* pedal);
+  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
+  [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
+  [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+
+ private:
+  void report(HidPort& port, std::span<const std::byte> report) override;
+  void gone() override;
+  struct Shared {
+    SpaceMouseState state;
+    std::int64_t time_ns = 0;
+  };
+  Seqlock<Shared> shared_;
+  Shared own_, last_;
+  HandGoal goal_;
+  Vec3 axis_{0, 0, 1};
+  std::atomic<std::uint8_t> tool_;
+  SpringHand hand_;
+  Mat3 rotation_;
+  const FootPedal* pedal_;
+  HidLink link_;
+};
+
+/// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the latest force, bridged by
+/// its plane of contact when the servo is late; the servo reads the latest pose. Motors rest until the servo speaks, and when it falls
+/// silent.
+class WoodenHapticsDevice final : public Device, HidHandler {
+ public:
+  WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal);
+  DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
+  void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
+  [[nodiscard]] DeviceTraits traits() const override;
+  [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+  /// Reports too short to be one; they are passed over.
+  [[nodiscard]] std::uint64_t garbled() const noexcept { return garbled_; }
+
+ private:
+  void opened(HidPort& port) override;
+  void report(HidPort& port, std::span<const std::byte> report) override;
+  void idle(HidPort& port) override;
+  void gone() override;
+  [[nodiscard]] bool newest_only() const override { return true; }
+  bool send(HidPort& port, std::array<double, 3> current_ma);
+
+  struct Pose {
+    Vec3 position_mm, axis;
+    bool button = false;
+    std::int64_t time_ns = 0;
+  };
+  WoodenHapticsGeometry geometry_;
+  WoodenHapticsKinematics kinematics_;
+  WorkspaceMap map_;
+  std::atomic<std::uint8_t> tool_;
+  const FootPedal* pedal_;
+  Seqlock<Pose> pose_;
+  Seqlock<ForcePlane> force_;
+  Pose last_pose_;      // of the servo
+  bool silent_ = true;  // the next pose takes hold where the tool is
+  Pose newest_;         // of the link
+  Vec3 newest_angles_rad_;
+  bool have_pose_ = false;
+  std::int64_t last_write_ns_ = 0;
+  std::atomic<std::uint64_t> garbled_{0};
+  HidLink link_;  // last: its thread uses all the others
+};
+
+/// What is plugged in, for people and for --json.
+struct FoundDevice {
+  HidInfo info;
+  DeviceModel model = DeviceModel::unknown;
+  bool readable = false;
+  std::string why;  ///< when it is not
+};
+/// Devices known here, each opened for a moment.
+[[nodiscard]] std::vector<FoundDevice> find_devices();
+
+}  // namespace osteo

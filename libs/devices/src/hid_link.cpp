@@ -1,0 +1,68 @@
+#include "osteo/devices/hid_link.h"
+
+#include <pthread.h>
+
+#include <array>
+#include <chrono>
+
+namespace osteo {
+
+HidLink::HidLink(Open open, HidHandler& handler, int timeout_ms) : open_(std::move(open)), handler_(handler), timeout_ms_(timeout_ms) {
+  thread_ = std::thread([this] { run(); });
+}
+
+HidLink::~HidLink() {
+  stop_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void HidLink::run() {
+  ::pthread_setname_np(::pthread_self(), "osteo-hid");
+  // Below the servo, above everything that may wait. Refused without the right: then it runs as it can.
+  sched_param priority{};
+  priority.sched_priority = 70;
+  ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority);
+  std::array<std::byte, 512> buffer{}, newer{};
+  while (!stop_) {
+    std::string why;
+    const auto port = open_(why);
+    if (port == nullptr) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      continue;
+    }
+    connected_ = true;
+    handler_.opened(*port);
+    while (!stop_) {
+      int n = port->read(buffer, timeout_ms_);
+      if (n < 0) break;
+      if (n > 0 && handler_.newest_only()) {
+        for (int m = port->read(newer, 0); m > 0; m = port->read(newer, 0)) {
+          buffer = newer;
+          n = m;
+          ++reports_;
+        }
+      }
+      if (n > 0) {
+        ++reports_;
+        handler_.report(*port, std::span(buffer.data(), static_cast<std::size_t>(n)));
+      }
+      handler_.idle(*port);
+    }
+    connected_ = false;
+    handler_.gone();
+    if (!stop_) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted) {
+  return [wanted = std::move(wanted)](std::string& why) -> std::unique_ptr<HidPort> {
+    why = "no such device";
+    for (const HidInfo& info : list_hid()) {
+      if (!wanted(info)) continue;
+      if (auto port = open_hid(info, why)) return port;
+    }
+    return nullptr;
+  };
+}
+
+}  // namespace osteo
