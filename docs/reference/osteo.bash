@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin curve snapshot structures phantom list info series guide convert run prepare rehearse replay demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin curve snapshot structures phantom list info series guide convert run prepare rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -51,8 +51,11 @@ _osteo() {
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --show-settings --side --seconds --rate-hz --fast --resume" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
+    export) flags="$flags" ;;
+    devices) flags="$flags --watch --recording" ;;
+    doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;
     docs) flags="$flags --check" ;;

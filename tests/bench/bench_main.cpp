@@ -12,6 +12,8 @@ int main(int argc, char** argv) {
   // Import first: it measures in processes of its own, which must start before any thread does.
   if (subject == "import" || subject == "all") osteo::bench_import(context);
   if (subject == "bone" || subject == "all") osteo::bench_bone(context);
+  if (subject == "haptics" || subject == "all") osteo::bench_haptics(context);
+  if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
 #ifdef OSTEO_BENCH_GEOMETRY
   if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
 #else
@@ -20,8 +22,9 @@ int main(int argc, char** argv) {
     return 2;
   }
 #endif
-  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, import\n", subject.c_str());
+  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" &&
+      subject != "haptics-fuzz") {
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import\n", subject.c_str());
     return 2;
   }
   return 0;

@@ -5,12 +5,75 @@
 #include "osteo/base/files.h"
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
+#include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/scene/session_folder.h"
 #include "osteo/window/rehearsal_window.h"
 
 namespace osteo {
 namespace {
+
+enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics };
+
+}  // namespace
+
+template <>
+struct EnumNames<Hand> {
+  static constexpr std::array<std::string_view, 4> values{"auto", "mouse", "spacemouse", "woodenhaptics"};
+};
+
+namespace {
+
+// What moves the drill: as asked, or the best that is plugged in; with a pedal where there is one.
+class Hands {
+ public:
+  Hands(Hand wanted, const std::string& arm_file) : hand_(wanted) {
+    for (const FoundDevice& f : find_devices()) {
+      const bool mouse = f.model == DeviceModel::space_mouse || f.model == DeviceModel::space_mouse_wireless;
+      if (hand_ == Hand::automatic && f.readable && (mouse || f.model == DeviceModel::woodenhaptics))
+        found_ = std::max(found_, mouse ? 1 : 2);
+      if (f.readable && (f.model == DeviceModel::pedal_infinity || f.model == DeviceModel::pedal_pcsensor))
+        pedal_ = std::make_unique<FootPedal>(f.model,
+                                             open_first([m = f.model](const HidInfo& i) { return model_of(i.vendor, i.product) == m; }));
+    }
+    if (hand_ == Hand::automatic) hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
+    if (!arm_file.empty()) geometry_ = load_woodenhaptics(arm_file);
+  }
+  /// `start_mm`: where the tool is when the device is first heard of.
+  [[nodiscard]] std::unique_ptr<Device> make(Vec3 start_mm, int tool) const {
+    // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
+    if (hand_ == Hand::spacemouse) {
+      return std::make_unique<SpaceMouseDevice>(open_first([](const HidInfo& i) {
+                                                  const DeviceModel m = model_of(i.vendor, i.product);
+                                                  return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
+                                                }),
+                                                start_mm, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, tool, pedal_.get());
+    }
+    if (hand_ == Hand::woodenhaptics) {
+      return std::make_unique<WoodenHapticsDevice>(
+          open_first([](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; }), geometry_,
+          WorkspaceMap(start_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1), tool, pedal_.get());
+    }
+    return std::make_unique<MouseDevice>();
+  }
+  [[nodiscard]] std::string name() const {
+    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) + (pedal_ ? " and pedal" : "");
+  }
+
+ private:
+  Hand hand_;
+  int found_ = 0;
+  WoodenHapticsGeometry geometry_;
+  std::unique_ptr<FootPedal> pedal_;
+};
+
+Vec3 in_front_of(const BrickGrid& bone, int tool) {
+  try {
+    return make_default_script(bone, true, tool, 10).waypoints.front().at_mm;
+  } catch (const Error&) {
+    return bone.frame().centre_mm();  // no bone on the left
+  }
+}
 
 struct WindowCommand {
   struct Params {
@@ -20,6 +83,8 @@ struct WindowCommand {
     BurrShape shape = BurrShape::ball;
     ContactMethod contact = ContactMethod::overlap;
     std::string settings;
+    Hand device = Hand::automatic;
+    std::string arm;
     double rate_hz = 1000;
     std::string resume;
     int width = 1360;
@@ -32,6 +97,8 @@ struct WindowCommand {
     visit({"shape", "of the burr at the start"}, p.shape);
     visit({"contact", "how the burr feels bone"}, p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"device", "what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
+    visit({"arm", "geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit({"width", "of the window", "pixels", 640, 8192}, p.width);
@@ -56,7 +123,7 @@ struct WindowCommand {
     std::filesystem::path next_folder = p.out, resume_from = p.resume;
     RehearsalOptions options;
     options.rate_hz = p.rate_hz;
-    options.haptics.device = MouseDevice().traits();
+    const Hands hands(p.device, p.arm);
     options.haptics.params.contact.method = p.contact;
     apply_haptic_settings(the_case.folder, p.settings, options.haptics);
 
@@ -67,8 +134,11 @@ struct WindowCommand {
       options.session_file = session.stream();
       rehearsal.reset();
       BrickGrid bone = bone_at_begin(session);
+      // In front of the bone on the patient's left, where the window looks.
+      auto device = hands.make(in_front_of(bone, tool), tool);
+      options.haptics.device = device->traits();
       if (options.haptics.hardness) options.hardness = hardness_of(the_case, bone);
-      rehearsal = std::make_unique<Rehearsal>(std::move(bone), std::make_unique<MouseDevice>(), options, io.context);
+      rehearsal = std::make_unique<Rehearsal>(std::move(bone), std::move(device), options, io.context);
       rehearsal->start();
     };
     actions.save = [&] {
@@ -86,6 +156,7 @@ struct WindowCommand {
     WindowOptions window;
     window.title = "Osteotome - " + the_case.folder.filename().string();
     window.tool = tool;
+    window.device = hands.name();
     window.width = p.width;
     window.height = p.height;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));

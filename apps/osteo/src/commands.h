@@ -166,6 +166,7 @@ struct RehearseCommand {
     BurrShape shape = BurrShape::ball;
     ContactMethod contact = ContactMethod::overlap;
     std::string settings;
+    std::string device;
     bool show_settings = false;
     Side side = Side::left;
     double seconds = 60;
@@ -182,6 +183,7 @@ struct RehearseCommand {
     visit({"shape", "of the burr at the start"}, p.shape);
     visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"device", "in the window: auto, mouse, spacemouse or woodenhaptics (empty: auto)"}, p.device);
     visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"}, p.show_settings);
     visit({"side", "of the patient, for the built-in strokes"}, p.side);
     visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);

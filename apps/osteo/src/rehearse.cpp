@@ -39,6 +39,7 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
                                 "--contact",      std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(p.contact)]),
                                 "--rate-hz",      format_number(p.rate_hz)};
   if (!p.settings.empty()) args.insert(args.end(), {"--settings", p.settings});
+  if (!p.device.empty()) args.insert(args.end(), {"--device", p.device});
   if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
   if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
   std::vector<char*> argv;

@@ -124,4 +124,15 @@ double CutDepth::operator()(double volume_mm3, double cosine) const noexcept {
   return (1 - t) * ((1 - s) * at(j, i) + s * at(j, i + 1)) + t * ((1 - s) * at(j + 1, i) + s * at(j + 1, i + 1));
 }
 
+double CutDepth::area_mm2(double volume_mm3, double cosine) const noexcept {
+  if (ball_) {
+    const double d = std::min(cap_depth_mm(volume_mm3, radius_mm_), radius_mm_);
+    return std::numbers::pi * d * (2 * radius_mm_ - d);
+  }
+  // From the table's own slope, over a step that its rounding does not see.
+  const double step = 0.02 * volume_mm3 + 1e-6 * volume_mm3_;
+  const double rise = (*this)(volume_mm3 + step, cosine) - (*this)(volume_mm3, cosine);
+  return step / std::max(rise, 1e-12);
+}
+
 }  // namespace osteo

@@ -57,7 +57,8 @@ class BurrProxy final : public ContactModel {
  private:
   ContactParams params_;
   double spacing_mm_;
-  std::vector<RoundCone> heads_;
+  std::vector<RoundCone> heads_, shells_;
+  std::vector<CutDepth> shell_depths_;
   std::vector<std::uint32_t> strides_;
   Overlap overlap_;
   GodObject proxy_;

@@ -59,8 +59,14 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
     : params_(params), spacing_mm_(spacing_mm), strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
-  for (const Burr& b : burr_library()) heads_.push_back(b.head());
-  static_cast<void>(head_cut_depth(0));  // not in the servo
+  for (const Burr& b : burr_library()) {
+    heads_.push_back(b.head());
+    RoundCone shell = b.head();
+    shell.start_radius_mm += 0.5 * spacing_mm;
+    shell.end_radius_mm += 0.5 * spacing_mm;
+    shells_.push_back(shell);
+    shell_depths_.emplace_back(shell);
+  }
 }
 
 ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
@@ -71,35 +77,39 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   if (!finite(at)) return r;
   if (tool_ != tool_of(pose)) proxy_.forget();
   tool_ = tool_of(pose);
-  const RoundCone& head = heads_[tool_];
-  // Contact is a cut of this depth: with none at all there would be no direction.
-  const double touch = 0.05 * spacing_mm_;
+  // The proxy is a shell around the burr, half a voxel thick, that bone fills to exactly its depth: the cut of a shell that deep is
+  // measured well, where a bare touch would be lost in the voxels.
+  const double shell = 0.5 * spacing_mm_;
+  const CutDepth& depths = shell_depths_[tool_];
   Vec3 where;
   OverlapResult there;
   const auto field = [&](Vec3 x) {
-    there = overlap_.measure(bone, head, x, axis_);
+    there = overlap_.measure(bone, shells_[tool_], x, axis_);
     where = x;
     Clearance c;
     const double pressed = length(there.area_mm2);
     if (!(pressed > 0)) {
-      // In air (or with bone on all sides alike: then hold on to the way back to where it came from).
-      // No voxel with bone is touched, so half a voxel further on contact is half a voxel deep at most, and undone.
-      c.value_mm = there.bone_mm3 > 0 ? -touch : 0.5 * spacing_mm_;
+      // No voxel with bone is touched: half a voxel further on it still does not reach the burr. Or bone on all sides alike: then back to
+      // where it came from.
+      c.value_mm = there.bone_mm3 > 0 ? -shell : shell;
       c.gradient = c.normal = there.bone_mm3 > 0 ? normalized(proxy_.position_mm() - at) : Vec3{0, 0, 1};
       if (length(c.normal) == 0) c.gradient = c.normal = axis_;
       return c;
     }
     c.normal = there.area_mm2 * (-1 / pressed);
-    c.value_mm = touch - head_cut_depth(tool_)(there.sharp_mm3, -dot(c.normal, axis_));
-    c.gradient = c.normal;
+    const double cosine = -dot(c.normal, axis_), depth = depths(there.sharp_mm3, cosine);
+    c.value_mm = shell - depth;
+    // In a hollow of the burr's own shape the volume grows faster than in flat bone: the step out is then the shorter.
+    const double flat = depths.area_mm2(there.sharp_mm3, cosine);
+    c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(pressed / flat, 0.5, 50.0) : 1.0);
     return c;
   };
   GodObjectParams g;
   g.friction = pose.drill_on != 0 ? 0 : params_.friction;
   g.static_friction = pose.drill_on != 0 ? 0 : params_.static_friction;
   g.feature_mm = 0.5 * spacing_mm_;
-  g.tolerance_mm = 2e-3 * spacing_mm_;
-  g.iterations = 6;
+  g.tolerance_mm = 1e-2 * spacing_mm_;
+  g.evaluations = spacing_mm_ < 0.3 ? 8 : 16;  // 100 to 200 us at most
   const GodObject::Answer answer = proxy_.update(field, at, g);
   const Vec3 offset = answer.proxy_mm - at;
   r.shown_offset_mm = offset;

@@ -42,7 +42,7 @@ constexpr double kDisplayForceN = 4;  // full length of the force bar
 class RehearsalWindow {
  public:
   RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
-      : actions_(actions), scan_(options.scan), tool_(options.tool) {
+      : actions_(actions), scan_(options.scan), tool_(options.tool), device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
     make_scene();
@@ -175,7 +175,12 @@ class RehearsalWindow {
     goal_.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
     goal_.tool = static_cast<std::uint8_t>(tool_);
     goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
-    static_cast<MouseDevice&>(actions_.rehearsal().device()).set_goal(goal_);
+    Device& device = actions_.rehearsal().device();
+    if (auto* const mouse = dynamic_cast<MouseDevice*>(&device)) {
+      mouse->set_goal(goal_);
+    } else {
+      device.set_tool(static_cast<std::uint8_t>(tool_));  // it moves and drills by itself
+    }
   }
 
   // The same burr but for one property.
@@ -325,11 +330,30 @@ class RehearsalWindow {
       }
     }
     drill_held_ = in_view && !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    gamepad(static_cast<double>(io.DeltaTime));
     const std::vector<KeyPress> presses = std::exchange(pressed_keys_, {});
     if (!io.WantTextInput) {
       for (const KeyPress& k : presses) key(k, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
     }
     send_goal();
+  }
+
+  // Left stick across the view, right stick deeper and back, right trigger drills.
+  void gamepad(double seconds) {
+    GLFWgamepadstate pad;
+    if (glfwGetGamepadState(GLFW_JOYSTICK_1, &pad) == GLFW_FALSE) return;
+    constexpr double kMmPerS = 40, kDeadZone = 0.12;
+    const auto axis = [&](int a) {
+      const double v = static_cast<double>(pad.axes[a]);
+      return std::abs(v) < kDeadZone ? 0.0 : v * std::abs(v);
+    };
+    double up[3];
+    renderer_->GetActiveCamera()->GetViewUp(up);
+    const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
+    const Vec3 move =
+        right * axis(GLFW_GAMEPAD_AXIS_LEFT_X) - above * axis(GLFW_GAMEPAD_AXIS_LEFT_Y) - forward * axis(GLFW_GAMEPAD_AXIS_RIGHT_Y);
+    goal_.position_mm += move * (kMmPerS * std::min(seconds, 0.1));
+    drill_held_ = drill_held_ || pad.axes[GLFW_GAMEPAD_AXIS_RIGHT_TRIGGER] > 0;
   }
 
   struct KeyPress {
@@ -501,6 +525,7 @@ class RehearsalWindow {
     ImGui::SameLine();
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
     ImGui::Separator();
+    ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
     if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
@@ -557,6 +582,7 @@ class RehearsalWindow {
   double radius_ = 100;
   HandGoal goal_;
   int tool_;
+  std::string device_name_;
   int gl_errors_ = 0;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   std::vector<KeyPress> pressed_keys_;

@@ -87,7 +87,11 @@ TEST(Histogram, QuantilesWithinAnEighth) {
 TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   int calls = 0;
   FixedRateLoop loop(1000, [&](std::int64_t) {
-    if (++calls == 20) std::this_thread::sleep_for(std::chrono::milliseconds(7));
+    ++calls;
+    const auto until = monotonic_ns() + 7'000'000;
+    while (calls == 20 && monotonic_ns() < until) {
+    }
+    if (calls == 40) std::this_thread::sleep_for(std::chrono::milliseconds(7));
     return calls < 60;
   });
   const auto begin = monotonic_ns();
@@ -95,7 +99,10 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   loop.join();
   EXPECT_EQ(calls, 60);
   EXPECT_EQ(loop.stats().ticks, 60u);
-  EXPECT_GE(loop.stats().missed_by_work, 5u);  // the sleep of 7 ms
+  // Seven milliseconds of work are our own; taken off the core for as long, we are not to blame.
+  EXPECT_GE(loop.stats().missed_by_work + loop.stats().missed_by_machine, 12u);
+  EXPECT_GE(loop.stats().missed_by_work, 4u);
+  EXPECT_GE(loop.stats().missed_by_machine, 5u);
   EXPECT_GE(monotonic_ns() - begin, 60'000'000);
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
 }

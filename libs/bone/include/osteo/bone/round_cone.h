@@ -33,6 +33,8 @@ class CutDepth {
   explicit CutDepth(const RoundCone& shape);
   /// Depth in mm. `cosine` between the plane's normal, pointing into what is cut off, and the axis. No allocation.
   [[nodiscard]] double operator()(double volume_mm3, double cosine) const noexcept;
+  /// Area of that cut, mm2: how fast the volume grows with depth.
+  [[nodiscard]] double area_mm2(double volume_mm3, double cosine) const noexcept;
 
  private:
   static constexpr int kAngles = 33, kVolumes = 65;

@@ -19,7 +19,7 @@ struct GodObjectParams {
   double static_friction = 0;  ///< until it slips; taken as `friction` when smaller
   double feature_mm = 1;       ///< moves along the surface in steps no longer than this: the voxel, or the radius of what is felt
   double tolerance_mm = 1e-6;  ///< contact and convergence; scale it with the object, so that metres and micrometres work alike
-  int iterations = 12;         ///< steps along the surface in an update; what is left is done in the next
+  int evaluations = 96;        ///< of the field in an update, at most (and a few more); what is left is done in the next
 };
 
 /// C. Zilles, J. Salisbury, IROS 1995, without triangles: the proxy minimises the distance to the device subject to clearance >= 0. In free
@@ -55,9 +55,9 @@ class GodObject {
     Clearance c = field(x_);
     a.evaluations = 1;
     // The surface may have moved over the proxy, or the proxy was put inside: out along the gradient.
-    for (int i = 0; i < kPushes && c.value_mm < -tolerance; ++i) c = step_out(field, c, p.feature_mm, a);
+    while (c.value_mm < -tolerance && a.evaluations < p.evaluations) c = step_out(field, c, p.feature_mm, a);
     bool stopped_by_friction = false;
-    for (int i = 0; i < p.iterations + kFreeSteps && a.evaluations < p.iterations + kFreeSteps; ++i) {
+    while (a.evaluations < p.evaluations) {
       const Vec3 way = device_mm - x_;
       const double distance = length(way);
       if (distance <= 1e-3 * tolerance) break;
@@ -72,7 +72,6 @@ class GodObject {
         if (c.value_mm < 0) c = settle(field, c, {}, p.feature_mm, tolerance, a);
         continue;
       }
-      if (i >= p.iterations && a.contact) break;
       a.contact = true;
       const double depth = -dot(way, c.normal);
       const Vec3 tangent = way + c.normal * depth;
@@ -102,7 +101,7 @@ class GodObject {
   }
 
  private:
-  static constexpr int kPushes = 64, kFreeSteps = 48, kSettles = 8;
+  static constexpr int kSettles = 8;
   static constexpr double kSameWall = 0.95, kLeastRise = 0.02;
 
   template <class Field>

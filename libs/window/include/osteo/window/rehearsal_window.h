@@ -15,6 +15,7 @@ struct WindowOptions {
   int width = 1360, height = 860;
   std::string title;
   int tool = 3;
+  std::string device = "mouse";  ///< as the panel names it
   VerdictSummary scan;  ///< what the import found in the scan; status empty: unknown
 };
 

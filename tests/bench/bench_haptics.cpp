@@ -1,0 +1,610 @@
+// Haptic rendering: speed against error, stability, removal, real time. Prints Markdown for docs/haptics.md.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <random>
+#include <thread>
+
+#include "bench.h"
+#include "duck.h"
+#include "osteo/grid/resample.h"
+#include "osteo/haptics/fields.h"
+#include "osteo/haptics/servo.h"
+#include "osteo/image/threshold.h"
+#include "osteo/io/volume_io.h"
+#include "osteo/rt/loop.h"
+#include "osteo/session/recorder.h"
+#include "slab.h"
+#include "stability.h"
+
+namespace osteo {
+namespace {
+
+const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
+const char* name_of(ContactMethod m) {
+  return EnumNames<ContactMethod>::values[static_cast<std::size_t>(m)].data();
+}
+
+struct Spread {
+  std::vector<double> values;
+  void add(double v) { values.push_back(v); }
+  double mean() const {
+    double s = 0;
+    for (const double v : values) s += v / static_cast<double>(values.size());
+    return s;
+  }
+  double at(double q) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())))];
+  }
+};
+
+// --- contact models against the truth ----------------------------------------------------------------------------------------------
+
+/// A surface by its signed distance (negative inside), exact near it, and a cube of it around `centre`.
+struct Body {
+  const char* name;
+  std::function<double(Vec3)> distance;
+  Vec3 centre;
+  std::function<Vec3(std::mt19937&)> place;  ///< of a burr's centre at a given clearance 0: a point of the surface to press on
+};
+
+Vec3 slope_of(const std::function<double(Vec3)>& f, Vec3 x) {
+  const double e = 1e-4;
+  return {(f(x + Vec3{e, 0, 0}) - f(x - Vec3{e, 0, 0})) / (2 * e), (f(x + Vec3{0, e, 0}) - f(x - Vec3{0, e, 0})) / (2 * e),
+          (f(x + Vec3{0, 0, e}) - f(x - Vec3{0, 0, e})) / (2 * e)};
+}
+
+BrickGrid voxels_of(const Body& body, double h) {
+  Frame f;
+  const double half = 9;
+  const int n = static_cast<int>(std::ceil(2 * half / h / 8)) * 8;
+  f.dims = {n, n, n};
+  f.spacing_mm = {h, h, h};
+  const double lo = -n * h / 2 + h / 2;
+  f.origin_mm = body.centre + Vec3{lo, lo, lo};
+  std::vector<Ijk> bricks;
+  for (int k = 0; k < n / 8; ++k)
+    for (int j = 0; j < n / 8; ++j)
+      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
+  BrickGrid g(f, bricks);
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const Vec3 c = f.world_from_index({double(i), double(j), double(k)});
+        const double d = body.distance(c);
+        double share = d < 0 ? 1 : 0;
+        if (std::abs(d) < 1.2 * h) {
+          int in = 0;
+          for (int s = 0; s < 512; ++s)
+            in += body.distance(c + Vec3{((s & 7) - 3.5) / 8 * h, ((s >> 3 & 7) - 3.5) / 8 * h, ((s >> 6) - 3.5) / 8 * h}) < 0 ? 1 : 0;
+          share = in / 512.0;
+        }
+        g.set(g.find(i, j, k), static_cast<float>(share));
+      }
+  return g;
+}
+
+/// Volume of the body in a ball and the push of its surface, by 64^3 points of the ball and 20,000 of its surface: within 0.2 %.
+struct Truth {
+  double volume = 0;
+  Vec3 normal;
+};
+Truth truth_of(const Body& body, Vec3 x, double r) {
+  Truth t;
+  const int n = 64;
+  const double step = 2 * r / n;
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const Vec3 o{(i + 0.5) * step - r, (j + 0.5) * step - r, (k + 0.5) * step - r};
+        if (dot(o, o) < r * r && body.distance(x + o) < 0) t.volume += step * step * step;
+      }
+  Vec3 push;
+  const int m = 20000;
+  for (int s = 0; s < m; ++s) {
+    const double z = 1 - (2 * s + 1.0) / m, a = s * M_PI * (3 - std::sqrt(5.0)), q = std::sqrt(1 - z * z);
+    const Vec3 d{q * std::cos(a), q * std::sin(a), z};
+    if (body.distance(x + d * r) < 0) push -= d;
+  }
+  t.normal = normalized(push);
+  return t;
+}
+
+void bench_contact() {
+  std::printf(
+      "### Contact models against the truth\n\nA 4 mm ball pressed 0.1 to 1.2 mm deep into a body known in closed form, 200 places; "
+      "stiffness 4 N/mm. The truth "
+      "for rays, volume and overlap: the law of the depth of a flat cut of the exact volume, along the exact push; for the proxy: the law "
+      "of the exact "
+      "distance of the ball from the surface.\n\n| body | voxels mm | method | mean force N | mean error N | p99 error N | direction off, "
+      "degrees | us p50 | us p99 "
+      "|\n|---|---|---|---|---|---|---|---|---|\n");
+  const double s3 = std::sin(M_PI / 6), c3 = std::cos(M_PI / 6);
+  const std::vector<Body> bodies{{"plane",
+                                  [](Vec3 p) {
+                                    return dot(p, normalized({0.3, 0.2, 1})) + 0.13;
+                                  },
+                                  {},
+                                  [](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-4, 4);
+                                    const Vec3 n = normalized({0.3, 0.2, 1});
+                                    const Vec3 q{u(r), u(r), 0};
+                                    return q - n * (dot(q, n) + 0.13);
+                                  }},
+                                 {"ball of 6.3 mm",
+                                  [](Vec3 p) { return length(p) - 6.3; },
+                                  {},
+                                  [](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-1, 1);
+                                    return normalized({u(r), u(r), u(r)}) * 6.3;
+                                  }},
+                                 // Its edge along y, 60 degrees; pressed on the edge and beside it.
+                                 {"wedge of 60 degrees",
+                                  [s3, c3](Vec3 p) { return std::max(p.x * c3 + p.z * s3, -p.x * c3 + p.z * s3) - 1; },
+                                  {},
+                                  [s3](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-4, 4);
+                                    return Vec3{0.15 * u(r), u(r), 1 / s3};
+                                  }},
+                                 {"closed smooth shape",
+                                  [](Vec3 p) { return test::duck(p) / std::max(length(slope_of(test::duck, p)), 0.5); },
+                                  {30, 0, 0},
+                                  [](std::mt19937& r) {
+                                    std::uniform_real_distribution<double> u(-0.12, 0.12);
+                                    const Vec3 d = normalized({1, u(r), u(r)});
+                                    return d * test::duck_radius(d);
+                                  }}};
+  const double r = 2;
+  for (const Body& body : bodies) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> deep(0.1, 1.2);
+    struct Pose {
+      Vec3 x, along;
+      Truth truth;
+      double clearance;
+      Vec3 out;
+    };
+    std::vector<Pose> poses;
+    while (poses.size() < 200) {
+      const Vec3 p = body.place(random), n = normalized(slope_of(body.distance, p + Vec3{1e-3, 2e-3, 3e-3}));
+      const Vec3 away = std::strcmp(body.name, "wedge of 60 degrees") == 0 ? Vec3{0, 0, 1} : n;
+      const double d = deep(random);
+      const Vec3 x = p + away * (r - d);
+      // The float pose is the true one.
+      const Vec3 exact{static_cast<double>(static_cast<float>(x.x)), static_cast<double>(static_cast<float>(x.y)),
+                       static_cast<double>(static_cast<float>(x.z))};
+      poses.push_back({exact, away, truth_of(body, exact, r), 0, {}});
+      // Distance by the nearest point found from the signed distance; for the wedge's outside near the edge the edge itself is nearest.
+      double sd = body.distance(exact);
+      Vec3 out = normalized(slope_of(body.distance, exact));
+      if (std::strcmp(body.name, "wedge of 60 degrees") == 0) {
+        const Vec3 q{exact.x, 0, exact.z - 1 / s3};
+        const bool edge = q.z > 0 && std::abs(q.x) * c3 < q.z * s3 * 1.0 + 1e-9 && std::abs(q.x) < q.z * std::tan(M_PI / 3);
+        if (edge) {
+          sd = length(q);
+          out = normalized(q);
+        }
+      } else if (body.name[0] == 'c') {
+        for (int i = 0; i < 20; ++i) {  // foot of the perpendicular
+          Vec3 foot = exact - out * sd;
+          foot = foot - test::duck_normal(foot) * test::duck(foot);
+          out = normalized(exact - foot);
+          sd = length(exact - foot);
+        }
+      }
+      poses.back().clearance = sd;
+      poses.back().out = out;
+    }
+    for (const double h : {0.25, 0.5, 1.0}) {
+      const BrickGrid bone = voxels_of(body, h);
+      for (const ContactMethod method : kMethods) {
+        ContactParams params;
+        params.method = method;
+        params.max_force_n = 100;
+        Spread error, direction, force, us;
+        for (int round = 0; round < 5; ++round) {
+          for (const Pose& p : poses) {
+            auto model = method == ContactMethod::proxy && round == 0 ? make_contact_model(params, h) : nullptr;
+            static std::unique_ptr<ContactModel> kept;
+            if (round == 0 && &p == &poses.front() && method != ContactMethod::proxy) kept = make_contact_model(params, h);
+            if (method == ContactMethod::proxy && model == nullptr) break;
+            ContactModel& m = model ? *model : *kept;
+            DeviceSample s;
+            s.tool = 3;
+            s.axis = {0.6F, 0, 0.8F};
+            if (method == ContactMethod::proxy) {
+              // It comes along the way it is pressed, as a hand would.
+              for (int i = 20; i > 0; --i) {
+                const Vec3 q = p.x + p.along * (0.1 * i);
+                s.position_mm = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
+                static_cast<void>(m.contact(bone, s));
+              }
+            }
+            s.position_mm = {static_cast<float>(p.x.x), static_cast<float>(p.x.y), static_cast<float>(p.x.z)};
+            const auto begin = std::chrono::steady_clock::now();
+            const ContactResult c = m.contact(bone, s);
+            us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
+            if (round > 0) continue;
+            const Vec3 truth = method == ContactMethod::proxy ? p.out * params.force_n(std::max(0.0, r - p.clearance))
+                                                              : p.truth.normal * params.force_n(cap_depth_mm(p.truth.volume, r));
+            error.add(length(c.force_n - truth));
+            force.add(length(truth));
+            if (length(c.force_n) > 0.05)
+              direction.add(std::acos(std::clamp(dot(normalized(c.force_n), normalized(truth)), -1.0, 1.0)) * 180 / M_PI);
+          }
+        }
+        std::printf("| %s | %g | %s | %.2f | %.3f | %.3f | %.2f | %.1f | %.1f |\n", body.name, h, name_of(method), force.mean(),
+                    error.mean(), error.at(0.99), direction.mean(), us.at(0.5), us.at(0.99));
+        std::fflush(stdout);
+      }
+    }
+  }
+}
+
+/// A head from ../shared/data, or the phantom.
+BrickGrid head(double h, const Context& context, std::string& name) {
+  const std::filesystem::path folder = std::filesystem::path(OSTEO_SHARED_DATA) / "ct_head_unc";
+  name = "phantom slab";
+  if (std::filesystem::exists(folder)) {
+    for (const auto& e : std::filesystem::directory_iterator(folder)) {
+      if (e.path().extension() != ".nrrd" && e.path().extension() != ".mha" && e.path().extension() != ".gz") continue;
+      try {
+        const Image ct = load_image(e.path(), context);
+        ThresholdParams t;
+        t.lower = 300;
+        ResampleParams r;
+        r.spacing_mm = h;
+        name = "real head";
+        return to_bricks(resample_bone(ct, threshold(ct, t), r, context).density);
+      } catch (const std::exception&) {
+      }
+    }
+  }
+  return test::slab(h);
+}
+
+void bench_kernel(const Context& context) {
+  std::printf(
+      "### A whole tick\n\nHead and shaft, drag, vibration, removal, guard, distance map: everything between a pose and a record. A 6 mm "
+      "burr drills for 20 s of "
+      "ticks.\n\n| bone | voxels mm | method | us p50 | p99 | p99.9 | voxels in the burr, mean | voxels a ms "
+      "|\n|---|---|---|---|---|---|---|---|\n");
+  for (const double h : {0.5, 0.2}) {
+    for (const bool real : {false, true}) {
+      std::string bone_name = "flat";
+      BrickGrid whole = test::slab(h);
+      Vec3 place{0, 0, 3};
+      if (real) {
+        if (h < 0.3) continue;  // the whole head at 0.2 mm is not what a scene holds
+        whole = head(h, context, bone_name);
+        // The first bone from the patient's left, half-way.
+        const Vec3 c = whole.frame().centre_mm();
+        for (double x = 120; x > 0; x -= 0.5) {
+          place = c + Vec3{x, 0, 0};
+          if (whole.nearest(place) > 0.5F) break;
+        }
+        place.x += 3;
+      }
+      for (const ContactMethod method : kMethods) {
+        BrickGrid bone = whole;
+        HapticSetup setup;
+        setup.params.contact.method = method;
+        setup.device = SpringHand::traits();
+        HapticRenderer renderer(setup, bone, nullptr, 1e-3);
+        SpringHand hand;
+        Spread us, voxels;
+        Vec3 force{};
+        for (int t = 0; t < 20000; ++t) {
+          const double s = t * 1e-3;
+          HandGoal goal;
+          const Vec3 turn{0, 4 * std::sin(5 * s), 4 * std::cos(5 * s)};
+          goal.position_mm = real ? place + turn + Vec3{-1 - 0.3 * s, 0, 0} : place + Vec3{turn.y, turn.z, -1 - 0.3 * s};
+          goal.axis = {0.6F, 0, 0.8F};
+          goal.drill_on = 1;
+          goal.tool = 5;
+          const DeviceSample sample = hand.step(goal, 1e-3, force);
+          const auto begin = std::chrono::steady_clock::now();
+          const auto step = renderer.step(bone, sample);
+          us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
+          force = {step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
+          voxels.add(step.record.immersed);
+        }
+        // What exact coverage stands for: every voxel under the burr, each tick.
+        const double under = burr_library()[5].head().volume_mm3() / (h * h * h);
+        std::printf("| %s | %g | %s | %.1f | %.1f | %.1f | %.0f | %.0f |\n", bone_name.c_str(), h, name_of(method), us.at(0.5), us.at(0.99),
+                    us.at(0.999), voxels.mean(), under / us.at(0.5) * 1000);
+        std::fflush(stdout);
+      }
+    }
+  }
+  std::printf(
+      "\nVectors: %s. One overlap of a 6 mm burr buried to its middle, deepest case:\n\n| voxels mm | us | voxels under it | of them a ms "
+      "|\n|---|---|---|---|\n",
+      overlap_simd_name());
+  for (const double h : {1.0, 0.5, 0.25, 0.2}) {
+    const auto bone = test::slab(h);
+    Overlap overlap(0);
+    Spread us;
+    for (int n = 0; n < 2000; ++n) {
+      const auto begin = std::chrono::steady_clock::now();
+      static_cast<void>(overlap.measure(bone, {0, 0, 3, 3}, {0.001 * n, 0.3, 0}, {0.6, 0, 0.8}));
+      us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
+    }
+    const double under = 4.0 / 3 * M_PI * 27 / (h * h * h);
+    std::printf("| %g | %.1f | %.0f | %.0f |\n", h, us.at(0.5), under, under / us.at(0.5) * 1000);
+  }
+}
+
+void bench_removal() {
+  std::printf(
+      "\n### Removal is a property of the burr\n\nThe same hand, 2 s on flat bone: volume removed over that at 0.5 mm and 1 kHz.\n\n| "
+      "method | burr | 0.25 mm | "
+      "0.35 mm | 1 mm | 500 Hz | 2 kHz | 5 kHz | removed mm3 |\n|---|---|---|---|---|---|---|---|---|\n");
+  for (const ContactMethod method : kMethods) {
+    for (const int tool : {3, 17, 38}) {
+      const auto drill = [&](double h, double hz) {
+        auto bone = test::slab(h);
+        HapticSetup setup;
+        setup.params.contact.method = method;
+        setup.params.effects.vibration = false;
+        setup.device = SpringHand::traits();
+        HapticRenderer renderer(setup, bone, nullptr, 1 / hz);
+        SpringHand hand;
+        double removed = 0;
+        Vec3 force{};
+        for (int t = 0; t < static_cast<int>(2 * hz); ++t) {
+          HandGoal goal;
+          const double s = t / hz;
+          goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
+          goal.axis = {0.6F, 0, 0.8F};
+          goal.drill_on = 1;
+          goal.tool = static_cast<std::uint8_t>(tool);
+          const auto step = renderer.step(bone, hand.step(goal, 1 / hz, force));
+          force = {step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
+          removed += static_cast<double>(step.record.removed_mm3);
+        }
+        return removed;
+      };
+      const double reference = drill(0.5, 1000);
+      std::printf("| %s | %s | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.1f |\n", name_of(method),
+                  burr_library()[static_cast<std::size_t>(tool)].name().c_str(), drill(0.25, 1000) / reference,
+                  drill(0.35, 1000) / reference, drill(1, 1000) / reference, drill(0.5, 500) / reference, drill(0.5, 2000) / reference,
+                  drill(0.5, 5000) / reference, reference);
+      std::fflush(stdout);
+    }
+  }
+}
+
+// --- god-object --------------------------------------------------------------------------------------------------------------------
+
+template <class Field>
+void duck_row(const char* what, const Field& field, double megabytes, double friction, double scale = 1) {
+  const auto recording = test::duck_recording(friction);
+  GodObject proxy;
+  GodObjectParams p{.friction = friction, .static_friction = friction, .feature_mm = 2 * scale, .tolerance_mm = 1e-5 * scale};
+  proxy.place(recording.front().surface_mm * scale);
+  Spread error, us;
+  int lost = 0;
+  std::size_t n = 0;
+  for (const auto& tick : recording) {
+    const Vec3 device = tick.device_mm * scale;
+    const auto begin = std::chrono::steady_clock::now();
+    const auto a = proxy.update(field, device, p);
+    us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
+    if (n++ >= 100) error.add(length((a.proxy_mm - device) * (test::kDuckStiffness / scale) - tick.force_n));
+    lost += a.contact ? 0 : 1;
+  }
+  std::printf("| %s | %.1f | %.1f | %.5f | %.5f | %.4f | %d | %.2f | %.2f |\n", what, megabytes, friction, error.mean(), error.at(0.95),
+              error.at(1), lost, us.at(0.5), us.at(0.999));
+  std::fflush(stdout);
+}
+
+void bench_god_object() {
+  std::printf(
+      "\n### God-object on a closed smooth shape\n\nA recorded probe (20 s, normal force 1.2 +- 0.8 N, 0.5 N/mm) played through the "
+      "renderer: mean of |true - "
+      "rendered| force. Published for CHAI3D 3.3 on the same shape, flat or shaded, from 168 to 140,624 triangles: 0.011 to 0.52 N at 0.7 "
+      "to 4 us, up to 22.6 N "
+      "worst with friction, all contacts lost in metres.\n\n| field | MB | friction | mean N | p95 N | worst N | lost | us p50 | us p99.9 "
+      "|\n|---|---|---|---|---|---|---|---|---|\n");
+  for (const int n : {32, 64, 128}) {
+    Frame f;
+    f.dims = {n, n, n};
+    const double h = 80.0 / (n - 1);
+    f.spacing_mm = {h, h, h};
+    f.origin_mm = {-40, -40, -40};
+    std::vector<float> v(f.voxel_count());
+    std::size_t at = 0;
+    for (int k = 0; k < n; ++k)
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) v[at++] = static_cast<float>(test::duck(f.world_from_index({double(i), double(j), double(k)})));
+    const CubicField field(f, std::move(v));
+    const std::string what = "cubic grid " + std::to_string(n) + "^3";
+    for (const double friction : {0.0, 0.3}) duck_row(what.c_str(), field, static_cast<double>(field.memory_bytes()) / 1e6, friction);
+  }
+  for (const auto& [rings, sectors] : {std::pair{22, 22}, {54, 54}, {180, 180}}) {
+    for (const bool shading : {false, true}) {
+      const MeshField field(test::duck_mesh(rings, sectors), shading);
+      const std::string what = std::to_string(2 * (rings - 1) * sectors) + " triangles" + (shading ? ", shaded" : ", flat");
+      for (const double friction : {0.0, 0.3}) duck_row(what.c_str(), field, 2 * (rings - 1) * sectors * 240e-6, friction);
+    }
+  }
+  for (const double scale : {1e-3, 1e3}) {
+    const MeshField field(test::duck_mesh(180, 180, scale), true);
+    duck_row(scale < 1 ? "64440 triangles in metres" : "64440 triangles in micrometres", field, 64440 * 240e-6, 0.3, scale);
+  }
+}
+
+// --- stability -----------------------------------------------------------------------------------------------------------------------
+
+void bench_stability() {
+  std::printf(
+      "\n### Stability\n\nA device of 0.1 kg pushed against a wall of 2 N/mm (2 kN/m) by 1 N. Stable: slower than 2 mm/s after 2.5 s. "
+      "Gained: the most that the wall "
+      "had given beyond what it had taken.\n\n| device | bare wall | mm/s at the end | gained mJ | guarded | stiffness in use N/mm | mm/s "
+      "at the end | gained mJ "
+      "|\n|---|---|---|---|---|---|---|---|\n");
+  for (const auto& c : test::kStabilityCases) {
+    const auto bare = test::push_against_wall(c, 2, false), guarded = test::push_against_wall(c, 2, true);
+    std::printf("| %s | %s | %.1f | %.3f | %s | %.2f | %.3f | %.4f |\n", c.name, bare.stable ? "stable" : "**not**", bare.fastest_mm_s,
+                bare.gained_mj, guarded.stable ? "stable" : "**not**", guarded.stiffness_n_per_mm, guarded.fastest_mm_s, guarded.gained_mj);
+  }
+}
+
+// --- real time -----------------------------------------------------------------------------------------------------------------------
+
+void bench_real_time() {
+  std::printf(
+      "\n### Ticks by the clock\n\nThe servo with recorder on flat bone at 0.5 mm, a 6 mm burr by overlap, 10 s each; loaded: four threads "
+      "that compute "
+      "without pause.\n\n| Hz | load | work p50 us | p99.9 | max | late p50 us | p99 | p99.9 | max | missed by work | by the machine |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  bool granted = false;
+  for (const double hz : {1000.0, 5000.0}) {
+    for (const bool loaded : {false, true}) {
+      std::atomic<bool> stop{false};
+      std::vector<std::thread> hogs;
+      if (loaded)
+        for (int i = 0; i < 4; ++i)
+          hogs.emplace_back([&] {
+            volatile double x = 1;
+            while (!stop) x = x * 1.0000001;
+          });
+      auto bone = test::slab(0.5);
+      HapticSetup setup;
+      setup.device = SpringHand::traits();
+      HapticRenderer renderer(setup, bone, nullptr, 1 / hz);
+      Script script;
+      script.tool = 5;
+      script.axis = {0.6, 0, 0.8};
+      for (int i = 0; i <= 100; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 3 - 0.04 * i}, true});
+      ScriptedDevice device(script, hz);
+      Stream stream;
+      const auto path = std::filesystem::temp_directory_path() / "osteo-bench-session.oss";
+      std::filesystem::remove(path);
+      Recorder recorder(stream.add_reader(), path, {});
+      Servo servo(bone, renderer, device, stream, hz);
+      FixedRateLoop loop(hz, [&](std::int64_t late) { return servo.step(late); });
+      recorder.start();
+      loop.start();
+      loop.join();
+      recorder.stop();
+      stop = true;
+      for (auto& t : hogs) t.join();
+      std::filesystem::remove(path);
+      const LoopStats& s = loop.stats();
+      granted = s.realtime_granted;
+      std::printf("| %g | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu | %llu |\n", hz, loaded ? "loaded" : "idle",
+                  s.work.quantile_us(0.5), s.work.quantile_us(0.999), s.work.max_us(), s.lateness.quantile_us(0.5),
+                  s.lateness.quantile_us(0.99), s.lateness.quantile_us(0.999), s.lateness.max_us(),
+                  static_cast<unsigned long long>(s.missed_by_work), static_cast<unsigned long long>(s.missed_by_machine));
+      std::fflush(stdout);
+    }
+  }
+  std::printf(
+      "\nReal-time priority was %s.\n\n### Handing a record over\n\n120 bytes and 8 changed voxels into the ring of a reader that writes "
+      "and syncs them, 5 kHz for 20 s.\n\n"
+      "| ns p50 | p99 | p99.9 | max | dropped |\n|---|---|---|---|---|\n",
+      granted ? "granted" : "refused");
+  Stream stream;
+  auto& reader = stream.add_reader();
+  const auto path = std::filesystem::temp_directory_path() / "osteo-bench-session.oss";
+  std::filesystem::remove(path);
+  Recorder recorder(reader, path, {});
+  recorder.start();
+  Spread ns;
+  ns.values.reserve(100000);
+  TickRecord record;
+  std::vector<VoxelChange> changes(8);
+  record.voxels_changed = 8;
+  FixedRateLoop loop(5000, [&](std::int64_t) {
+    record.tick = ns.values.size();
+    const std::int64_t begin = monotonic_ns();
+    stream.publish(record, changes);
+    ns.add(static_cast<double>(monotonic_ns() - begin));
+    return ns.values.size() < 100000;
+  });
+  loop.start();
+  loop.join();
+  recorder.stop();
+  std::filesystem::remove(path);
+  std::printf("| %.0f | %.0f | %.0f | %.0f | %llu |\n", ns.at(0.5), ns.at(0.99), ns.at(0.999), ns.at(1),
+              static_cast<unsigned long long>(reader.dropped.load()));
+}
+
+}  // namespace
+
+void bench_haptics(const Context& context) {
+  std::printf("## Haptics\n\n");
+  bench_contact();
+  std::printf("\n");
+  bench_kernel(context);
+  bench_removal();
+  bench_god_object();
+  bench_stability();
+  bench_real_time();
+}
+
+// Anything a device may say, `OSTEO_FUZZ_TICKS` times (10^6): finite, within limits, always.
+void bench_haptics_fuzz(const Context&) {
+  const char* const wish = std::getenv("OSTEO_FUZZ_TICKS");
+  const auto ticks = static_cast<std::uint64_t>(wish != nullptr ? std::atof(wish) : 1e6);
+  std::printf("### Fuzz\n\n| method | ticks | not finite | over the limit | over the rate | removed mm3 |\n|---|---|---|---|---|---|\n");
+  for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+    // Most for the default method; the others share the rest.
+    const std::uint64_t n = method == ContactMethod::overlap ? ticks * 7 / 10 : ticks / 10;
+    std::mt19937_64 random(42);
+    std::uniform_real_distribution<double> u(-1, 1);
+    std::uint64_t bad = 0, over = 0, steep = 0;
+    double removed = 0;
+    HapticSetup setup;
+    setup.params.contact.method = method;
+    setup.device.max_force_n = 3.3;
+    std::unique_ptr<HapticRenderer> renderer;
+    BrickGrid bone;
+    Vec3 x{0, 0, 5}, last{};
+    for (std::uint64_t t = 0; t < n; ++t) {
+      if (t % 2'000'000 == 0) {
+        const double a = 0.7 + 0.1 * static_cast<double>(t / 2'000'000 % 5);
+        bone = voxels_of(
+            {"fuzz", [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; }, {}, {}}, 0.5);
+        renderer = std::make_unique<HapticRenderer>(setup, bone, nullptr, 1e-3);
+        last = {};
+      }
+      const auto dice = random() % 1000;
+      if (dice < 5) x = Vec3{u(random), u(random), u(random)} * 12;
+      x += Vec3{u(random), u(random), u(random)} * (dice < 50 ? 3 : 0.3);
+      if (length(x) > 14) x = x * 0.5;
+      DeviceSample s;
+      s.position_mm = {static_cast<float>(x.x), static_cast<float>(x.y), static_cast<float>(x.z)};
+      s.axis = {static_cast<float>(u(random)), static_cast<float>(u(random)), static_cast<float>(u(random))};
+      s.drill_on = random() % 50 == 0;
+      s.tool = static_cast<std::uint8_t>(random() % 50);
+      s.age_ms = dice > 990 ? static_cast<std::uint8_t>(random()) : 0;
+      if (dice == 500) s.position_mm[random() % 3] = NAN;
+      if (dice == 501) s.axis[random() % 3] = INFINITY;
+      if (dice == 502) s.position_mm[random() % 3] = 1e30F;
+      const auto step = renderer->step(bone, s);
+      const Vec3 f{step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
+      bad += std::isfinite(length(f)) ? 0 : 1;
+      over += length(f) > 3.3 * (1 + 1e-6) ? 1 : 0;
+      steep += length(f - last) > setup.params.guard.max_rate_n_per_s * 1e-3 * (1 + 1e-5) + 1e-6 ? 1 : 0;
+      last = f;
+      removed += static_cast<double>(step.record.removed_mm3);
+    }
+    std::printf("| %s | %llu | %llu | %llu | %llu | %.0f |\n", name_of(method), static_cast<unsigned long long>(n),
+                static_cast<unsigned long long>(bad), static_cast<unsigned long long>(over), static_cast<unsigned long long>(steep),
+                removed);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace osteo
