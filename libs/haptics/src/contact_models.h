@@ -58,7 +58,7 @@ class BurrProxy final : public ContactModel {
   ContactParams params_;
   double spacing_mm_;
   std::vector<RoundCone> heads_, shells_;
-  std::vector<CutDepth> shell_depths_;
+  const std::vector<CutDepth>& shell_depths_;
   std::vector<std::uint32_t> strides_;
   Overlap overlap_;
   GodObject proxy_;

@@ -1,10 +1,30 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 
 #include "contact_models.h"
 
 namespace osteo {
 namespace {
+
+RoundCone shell_of(RoundCone head, double spacing_mm) {
+  head.start_radius_mm += 0.5 * spacing_mm;
+  head.end_radius_mm += 0.5 * spacing_mm;
+  return head;
+}
+
+// Tables of all burrs' shells take a quarter of a second: kept for each spacing that was used.
+const std::vector<CutDepth>& shell_depths(double spacing_mm) {
+  static std::mutex mutex;
+  static std::map<double, std::vector<CutDepth>> known;
+  const std::lock_guard lock(mutex);
+  std::vector<CutDepth>& tables = known[spacing_mm];
+  if (tables.empty()) {
+    for (const Burr& b : burr_library()) tables.emplace_back(shell_of(b.head(), spacing_mm));
+  }
+  return tables;
+}
 
 // With more voxels under the burr than may change in a tick, their rows take turns.
 std::vector<std::uint32_t> strides_for(double spacing_mm) {
@@ -58,14 +78,14 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 }
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
-    : params_(params), spacing_mm_(spacing_mm), strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
+    : params_(params),
+      spacing_mm_(spacing_mm),
+      shell_depths_(shell_depths(spacing_mm)),
+      strides_(strides_for(spacing_mm)),
+      overlap_(most_hits(spacing_mm)) {
   for (const Burr& b : burr_library()) {
     heads_.push_back(b.head());
-    RoundCone shell = b.head();
-    shell.start_radius_mm += 0.5 * spacing_mm;
-    shell.end_radius_mm += 0.5 * spacing_mm;
-    shells_.push_back(shell);
-    shell_depths_.emplace_back(shell);
+    shells_.push_back(shell_of(b.head(), spacing_mm));
   }
 }
 

@@ -47,16 +47,16 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
       const auto beside = [&] { return path.parent_path() / value.get<std::string>(); };
       if (key == "hardness") {
         setup.hardness = value.get<bool>();
-      } else if (key == "curve") {
+      } else if (key == "curve_file") {
         setup.curve = load_points(beside());
         if (setup.curve.size() < 2) throw Error(ExitCode::usage, name + ": the curve has fewer than 2 points");
-      } else if (key == "vibration") {
+      } else if (key == "vibration_file") {
         setup.vibration_json = read_text(beside());
         static_cast<void>(parse_vibration(setup.vibration_json, "'" + beside().string() + "'"));
       } else {
         const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
         if (f == fields.end()) {
-          std::vector<std::string> known{"hardness", "curve", "vibration"};
+          std::vector<std::string> known{"hardness", "curve_file", "vibration_file"};
           for (const FieldRef& r : fields) known.emplace_back(r.doc.name);
           const std::string near = nearest_name(key, known);
           throw Error(ExitCode::usage, name + " has no setting \"" + key + "\"" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),

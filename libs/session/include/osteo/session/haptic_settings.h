@@ -8,7 +8,7 @@
 namespace osteo {
 
 /// { "osteotome_haptics": 1, "method": "proxy", "stiffness_n_per_mm": 2, ..., "hardness": true,
-///   "curve": "incision.csv", "curve_stiffness_n_per_mm": 0.5, "vibration": "measured.json" }
+///   "curve_file": "incision.csv", "curve_stiffness_n_per_mm": 0.5, "vibration_file": "measured.json" }
 /// Any field of HapticsParams under its name; what is not named keeps its value in `setup`. Files are found beside this one.
 /// Errors: usage, with the key; no_input.
 void load_haptic_settings(const std::filesystem::path& path, HapticSetup& setup);
