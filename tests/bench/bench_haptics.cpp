@@ -298,7 +298,7 @@ void bench_kernel(const Context& context) {
         HapticSetup setup;
         setup.params.contact.method = method;
         setup.device = SpringHand::traits();
-        HapticRenderer renderer(setup, bone, nullptr, 1e-3);
+        HapticRenderer renderer(setup, bone, {}, 1e-3);
         SpringHand hand;
         Spread us, voxels;
         Vec3 force{};
@@ -356,7 +356,7 @@ void bench_removal() {
         setup.params.contact.method = method;
         setup.params.effects.vibration = false;
         setup.device = SpringHand::traits();
-        HapticRenderer renderer(setup, bone, nullptr, 1 / hz);
+        HapticRenderer renderer(setup, bone, {}, 1 / hz);
         SpringHand hand;
         double removed = 0;
         Vec3 force{};
@@ -481,7 +481,7 @@ void bench_real_time() {
       auto bone = test::slab(0.5);
       HapticSetup setup;
       setup.device = SpringHand::traits();
-      HapticRenderer renderer(setup, bone, nullptr, 1 / hz);
+      HapticRenderer renderer(setup, bone, {}, 1 / hz);
       Script script;
       script.tool = 5;
       script.axis = {0.6, 0, 0.8};
@@ -576,7 +576,7 @@ void bench_haptics_fuzz(const Context&) {
         const double a = 0.7 + 0.1 * static_cast<double>(t / 2'000'000 % 5);
         bone = voxels_of(
             {"fuzz", [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; }, {}, {}}, 0.5);
-        renderer = std::make_unique<HapticRenderer>(setup, bone, nullptr, 1e-3);
+        renderer = std::make_unique<HapticRenderer>(setup, bone, {}, 1e-3);
         last = {};
       }
       const auto dice = random() % 1000;

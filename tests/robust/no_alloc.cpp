@@ -93,7 +93,7 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     setup.params.contact.method = method;
     setup.device = SpringHand::traits();
     setup.curve = {{-5, 0, 1}, {0, 3, 0}, {5, 0, 1}};
-    HapticRenderer renderer(setup, bone, nullptr, 1e-3);
+    HapticRenderer renderer(setup, bone, {}, 1e-3);
     Stream stream;
     auto& reader = stream.add_reader(1 << 14, 1 << 22);
     Script script;

@@ -137,13 +137,13 @@ struct WindowCommand {
       // In front of the bone on the patient's left, where the window looks.
       auto device = hands.make(in_front_of(bone, tool), tool);
       options.haptics.device = device->traits();
-      if (options.haptics.hardness) options.hardness = hardness_of(the_case, bone);
+      options.anatomy = anatomy_of(the_case, bone, options.haptics, io.context);
       rehearsal = std::make_unique<Rehearsal>(std::move(bone), std::move(device), options, io.context);
       rehearsal->start();
     };
     actions.save = [&] {
       const RehearsalSummary s = rehearsal->stop();
-      write_summary(session, s, p.rate_hz, "window");
+      write_summary(session, s, p.rate_hz, "window", options.anatomy);
       resume_from = session.folder;
       if (!io.common.quiet)
         io.err << "session: " << session.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)\n";

@@ -97,7 +97,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.haptics.device = device->traits();
   options.haptics.params.contact.method = p.contact;
   apply_haptic_settings(the_case.folder, p.settings, options.haptics);
-  if (options.haptics.hardness) options.hardness = hardness_of(the_case, bone);
+  options.anatomy = anatomy_of(the_case, bone, options.haptics, io.context);
   Rehearsal rehearsal(std::move(bone), std::move(device), options, io.context);
   RehearsalSummary s;
   if (p.fast) {
@@ -119,7 +119,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const TriMesh after = draw(rehearsal.bone(), "after.png");
   save_surface(after, folder / "surface.ply");
 
-  const std::string summary = write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name());
+  const std::string summary = write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
   if (!io.common.quiet) {
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
@@ -151,9 +151,8 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const Session session = read_session(folder.stream());
   BrickGrid bone = bone_at_begin(folder);
-  std::shared_ptr<const Hardness> hardness;
-  if (session.header.haptics.hardness) hardness = hardness_of(load_case(folder.case_folder), bone);
-  const ReplayResult r = replay(session, bone, hardness, io.context);
+  HapticSetup setup = session.header.haptics;
+  const ReplayResult r = replay(session, bone, anatomy_of(load_case(folder.case_folder), bone, setup, io.context), io.context);
   if (!p.surface_out.empty()) {
     if (fs::exists(p.surface_out) && !io.common.force)
       throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");

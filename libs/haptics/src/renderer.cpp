@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact_models.h"
+#include "osteo/bone/thickness.h"
 
 namespace osteo {
 namespace {
@@ -15,7 +16,7 @@ std::array<float, 3> floats(Vec3 v) {
 // Above this share of the head in bone the pushes begin to cancel; at the second the map alone gives the direction.
 constexpr double kEscapeFrom = 0.6, kEscapeAll = 0.9;
 constexpr double kFarthestMm = 1e6;  // no pose of a hand: broken, as is what is not a number
-constexpr int kMapBudget = 48;  // blocks of the distance map a tick, 5 us
+constexpr int kMapBudget = 48;       // blocks of the distance map a tick, 5 us
 
 HapticsParams made_safe(HapticsParams p, const DeviceTraits& device, double dt_s) {
   const double most = safe_stiffness_n_per_mm(device, p.guard.contact_damping_n_s_per_m, dt_s);
@@ -26,9 +27,9 @@ HapticsParams made_safe(HapticsParams p, const DeviceTraits& device, double dt_s
 
 }  // namespace
 
-HapticRenderer::HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, std::shared_ptr<const Hardness> hardness, double dt_s)
+HapticRenderer::HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, const Anatomy& anatomy, double dt_s)
     : params_(made_safe(setup.params, setup.device, dt_s)),
-      hardness_(std::move(hardness)),
+      anatomy_(anatomy),
       dt_s_(dt_s),
       model_(make_contact_model(params_.contact, bone.frame().spacing_mm.x)),
       removal_(most_hits(bone.frame().spacing_mm.x)),
@@ -130,11 +131,27 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   in.jumped = jumped;
   const Guard::Output out = guard_.limit(in, dt_s_);
 
+  TickRecord& r = result.record;
+  if (usable && contact_.normal_force_n > 0) {
+    // Under the deepest point of the head.
+    const RoundCone head = burr.head();
+    const Vec3 away = contact_.normal;
+    const double foot = dot(away, axis) < 0 ? head.length_mm : 0;
+    const Vec3 deepest = at + contact_.shown_offset_mm + axis * foot - away * head.radius_at_mm(foot);
+    r.thickness_mm = static_cast<float>(thickness_mm(bone, deepest + away * bone.frame().spacing_mm.x, -away));
+  }
+  if (anatomy_.structures && usable) {
+    const auto near = anatomy_.structures->clearance(burr.head(), at + contact_.shown_offset_mm, axis);
+    r.clearance_mm = static_cast<float>(near.distance_mm);
+    r.structure = near.structure;
+    if (near.structure != 0 && near.distance_mm <= 0) flags_ |= kStructureTouched | (pose.drill_on != 0 ? static_cast<std::uint32_t>(kStructureInjured) : 0U);
+  }
+
   double removed = 0;
   // A hand whose force is not back yet, or that is not heard of, removes nothing.
   if (pose.drill_on != 0 && (out.flags & (kPoseJumped | kPoseStale)) == 0) {
-    result.changes =
-        removal_.remove(bone, model_->cut(bone), burr, contact_.normal_force_n, params_.effects.speed_rpm, dt_s_, hardness_.get(), removed);
+    result.changes = removal_.remove(bone, model_->cut(bone), burr, contact_.normal_force_n, params_.effects.speed_rpm, dt_s_,
+                                     anatomy_.hardness.get(), removed);
   }
   if (depth_map_) {
     const std::size_t n = std::min(result.changes.size(), changed_.size());
@@ -142,7 +159,6 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
     depth_map_->update(bone, {changed_.data(), n}, kMapBudget);
   }
 
-  TickRecord& r = result.record;
   r.device = sample;
   r.force_n = floats(out.force_n);
   r.torque_n_mm = floats(std::isfinite(dot(torque, torque)) ? torque : Vec3{});

@@ -15,7 +15,7 @@ Rehearsal::Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const Rehea
     : bone_(std::move(bone)),
       device_(std::move(device)),
       options_(options),
-      renderer_(options.haptics, bone_, options.hardness, 1 / options.rate_hz),
+      renderer_(options.haptics, bone_, options.anatomy, 1 / options.rate_hz),
       servo_(bone_, renderer_, *device_, stream_, options.rate_hz),
       tick_buffer_(1024),
       change_buffer_(1 << 20) {
@@ -56,7 +56,14 @@ std::size_t Rehearsal::drain_surface() {
     double removed = 0;
     for (std::size_t t = 0; t < n; ++t) {
       wanted += tick_buffer_[t].voxels_changed;
-      removed += static_cast<double>(tick_buffer_[t].removed_mm3);
+      const TickRecord& r = tick_buffer_[t];
+      removed += static_cast<double>(r.removed_mm3);
+      if (r.structure == 0) continue;
+      const auto clearance = static_cast<double>(r.clearance_mm);
+      auto& e = structure_events_.try_emplace(r.structure, RehearsalSummary::StructureEvents{clearance, 0, 0}).first->second;
+      e.least_clearance_mm = std::min(e.least_clearance_mm, clearance);
+      e.ticks_touched += (r.flags & kStructureTouched) != 0 ? 1 : 0;
+      e.ticks_injured += (r.flags & kStructureInjured) != 0 ? 1 : 0;
     }
     if (wanted > change_buffer_.size()) change_buffer_.resize(wanted);
     const std::size_t got = surface_reader_->changes.pop({change_buffer_.data(), wanted});
@@ -119,6 +126,7 @@ RehearsalSummary Rehearsal::finish() {
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3});
     s.session_bytes = recorder_->bytes();
   }
+  s.structures = structure_events_;
   if (loop_) s.loop = loop_->stats();
   return s;
 }
@@ -130,7 +138,7 @@ void Rehearsal::with_surface(const std::function<void(const LiveSurface&, std::s
   f(*surface_, changed);
 }
 
-ReplayResult replay(const Session& session, BrickGrid& bone, std::shared_ptr<const Hardness> hardness, const Context& context) {
+ReplayResult replay(const Session& session, BrickGrid& bone, const Anatomy& anatomy, const Context& context) {
   const auto begin = std::chrono::steady_clock::now();
   ReplayResult result;
   if (bone.hash() != session.header.bone_hash) {
@@ -142,11 +150,15 @@ ReplayResult replay(const Session& session, BrickGrid& bone, std::shared_ptr<con
   for (const TickRecord& t : session.ticks) samples.push_back(t.device);
   BrickGrid from_changes = bone;  // the second way: apply the recorded changes
   ReplayDevice device(std::move(samples));
-  if (session.header.haptics.hardness != (hardness != nullptr)) {
+  if (session.header.haptics.hardness != (anatomy.hardness != nullptr)) {
     throw Error(ExitCode::usage, "the session went by the hardness of the bone, which this case does not tell",
                 "the case needs its hu.vdb");
   }
-  HapticRenderer renderer(session.header.haptics, bone, std::move(hardness), 1 / session.header.rate_hz);
+  if (session.header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : "")) {
+    throw Error(ExitCode::corrupt, "the session watched other structures at risk than this case has",
+                "give the case it was recorded on, unchanged");
+  }
+  HapticRenderer renderer(session.header.haptics, bone, anatomy, 1 / session.header.rate_hz);
   Stream stream;
   StreamReader& reader = stream.add_reader();
   Servo servo(bone, renderer, device, stream, session.header.rate_hz);

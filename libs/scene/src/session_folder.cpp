@@ -5,6 +5,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/grid/grid_io.h"
+#include "osteo/io/volume_io.h"
 #include "osteo/session/haptic_settings.h"
 
 namespace osteo {
@@ -89,16 +90,29 @@ void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, Ha
   }
 }
 
-std::shared_ptr<const Hardness> hardness_of(const Case& the_case, const BrickGrid& bone) {
-  const auto hu = the_case.files.find("hu");
-  if (hu == the_case.files.end()) {
-    throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
-                "set \"hardness\" to false, or prepare the case with its hu.vdb");
+Anatomy anatomy_of(const Case& the_case, const BrickGrid& bone, HapticSetup& setup, const Context& context) {
+  Anatomy anatomy;
+  if (setup.hardness) {
+    const auto hu = the_case.files.find("hu");
+    if (hu == the_case.files.end()) {
+      throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
+                  "set \"hardness\" to false, or prepare the case with its hu.vdb");
+    }
+    anatomy.hardness = std::make_shared<const Hardness>(bone, load_grid(hu->second));
   }
-  return std::make_shared<const Hardness>(bone, load_grid(hu->second));
+  setup.structures.clear();
+  if (const auto file = the_case.files.find("structures"); file != the_case.files.end()) {
+    const auto volume = load_volume(file->second, context);
+    if (const auto* labels = std::get_if<Labels>(&volume)) {
+      anatomy.structures = std::make_shared<const StructureMap>(*labels, 8, context);
+      setup.structures = anatomy.structures->hash();
+    }
+  }
+  return anatomy;
 }
 
-std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr) {
+std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr,
+                          const Anatomy& anatomy) {
   ordered_json j;
   j["osteotome_session_summary"] = 1;
   j["ticks"] = s.ticks;
@@ -109,6 +123,17 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["surface_hash"] = s.surface_hash;
   j["session_bytes"] = s.session_bytes;
   j["ticks_lost_by_readers"] = s.dropped;
+  if (anatomy.structures) {
+    // Seconds, not ticks: for people. What was never within reach is not listed.
+    j["structures"] = ordered_json::array();
+    for (const auto& [value, e] : s.structures) {
+      j["structures"].push_back({{"name", anatomy.structures->name_of(static_cast<std::uint8_t>(value))},
+                                 {"value", value},
+                                 {"least_clearance_mm", e.least_clearance_mm},
+                                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
+                                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
+    }
+  }
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

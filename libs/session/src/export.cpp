@@ -52,6 +52,9 @@ constexpr Column kColumns[] = {
     {"voxels_changed", [](const TickRecord& t) { return static_cast<double>(t.voxels_changed); }, true},
     {"flags", [](const TickRecord& t) { return static_cast<double>(t.flags); }, true},
     {"energy_mj", [](const TickRecord& t) { return static_cast<double>(t.energy_mj); }, false},
+    {"thickness_mm", [](const TickRecord& t) { return static_cast<double>(t.thickness_mm); }, false},
+    {"clearance_mm", [](const TickRecord& t) { return static_cast<double>(t.clearance_mm); }, false},
+    {"structure", [](const TickRecord& t) { return static_cast<double>(t.structure); }, true},
     {"work_us", [](const TickRecord& t) { return static_cast<double>(t.work_us); }, false},
     {"lateness_us", [](const TickRecord& t) { return static_cast<double>(t.lateness_us); }, false},
 };

@@ -58,6 +58,7 @@ ordered_json to_json(const HapticSetup& h) {
                  {"max_force_n", h.device.max_force_n},
                  {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
   j["hardness"] = h.hardness;
+  j["structures"] = h.structures;
   j["vibration"] = h.vibration_json;
   j["curve"] = ordered_json::array();
   for (const Vec3 p : h.curve) j["curve"].push_back({p.x, p.y, p.z});
@@ -72,6 +73,7 @@ HapticSetup setup_of(const ordered_json& j) {
   const auto& d = j.at("device");
   h.device = {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
   h.hardness = j.at("hardness");
+  h.structures = j.at("structures");
   h.vibration_json = j.at("vibration");
   for (const auto& p : j.at("curve")) h.curve.push_back({p.at(0), p.at(1), p.at(2)});
   const auto& c = j.at("curve_params");

@@ -31,13 +31,13 @@
 #include "osteo/view/actors.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/offscreen.h"
+#include "status_panel.h"
 
 namespace osteo {
 namespace {
 
 constexpr int kPanelWidth = 270, kSliceWidth = 290;
 constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
-constexpr double kDisplayForceN = 4;  // full length of the force bar
 
 class RehearsalWindow {
  public:
@@ -495,21 +495,7 @@ class RehearsalWindow {
     if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_diameter(diameter);
     ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
     ImGui::Separator();
-    const double force =
-        length({static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2])});
-    char text[64];
-    std::snprintf(text, sizeof text, "%.2f N", force);
-    ImGui::Text("Force");
-    const float share = static_cast<float>(std::min(1.0, force / kDisplayForceN));
-    ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImVec4(0.3F + 0.65F * share, 0.75F - 0.5F * share, 0.25F, 1));
-    ImGui::ProgressBar(share, {-1, 22}, text);
-    ImGui::PopStyleColor();
-    ImGui::Text("Depth of burr in bone  %.2f mm", static_cast<double>(tick.depth_mm));
-    if ((tick.flags & kShaftContact) != 0) ImGui::TextColored(ImVec4(1.0F, 0.8F, 0.35F, 1), "the shaft touches bone");
-    if ((tick.flags & kEscape) != 0) ImGui::TextColored(ImVec4(1.0F, 0.5F, 0.35F, 1), "the burr is buried in bone");
-    ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
-    const double seconds = static_cast<double>(tick.tick) / rehearsal.rate_hz();
-    ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
+    draw_status(rehearsal, tick);
     ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
     if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;

@@ -195,7 +195,7 @@ struct Loop {
         }) {
     setup.device = device.traits();
     setup.params.contact.stiffness_n_per_mm = 2;
-    renderer = std::make_unique<HapticRenderer>(setup, bone, nullptr, 1e-3);
+    renderer = std::make_unique<HapticRenderer>(setup, bone, Anatomy{}, 1e-3);
     servo = std::make_unique<Servo>(bone, *renderer, device, stream, 1000);
   }
   ~Loop() {

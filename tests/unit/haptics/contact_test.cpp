@@ -383,7 +383,7 @@ double drill(ContactMethod method, double h, double rate_hz, int tool = 3) {
   setup.params.contact.method = method;
   setup.params.effects.vibration = false;
   setup.device = SpringHand::traits();
-  HapticRenderer renderer(setup, bone, nullptr, 1 / rate_hz);
+  HapticRenderer renderer(setup, bone, {}, 1 / rate_hz);
   SpringHand hand;
   double removed = 0;
   Vec3 force{};
@@ -471,7 +471,7 @@ TEST(DepthMap, EqualsOneMadeAnewAfterDrilling) {
 TEST(LiveSurface, FollowsTheDrillToTheBit) {
   auto bone = slab(0.5);
   LiveSurface live(bone, {});
-  HapticRenderer renderer({}, bone, nullptr, 1e-3);
+  HapticRenderer renderer({}, bone, {}, 1e-3);
   Stream stream;
   StreamReader& reader = stream.add_reader();
   Script script;

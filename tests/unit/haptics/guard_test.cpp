@@ -50,7 +50,7 @@ struct Checked {
   double removed = 0;
   std::vector<TickRecord> records;
 
-  Checked(const HapticSetup& s, const BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, nullptr, dt_s), dt(dt_s), setup(s) {}
+  Checked(const HapticSetup& s, const BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, {}, dt_s), dt(dt_s), setup(s) {}
 
   Vec3 step(BrickGrid& bone, const DeviceSample& sample) {
     const auto [r, changes] = renderer.step(bone, sample);

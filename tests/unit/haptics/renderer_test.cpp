@@ -41,7 +41,7 @@ TEST(Drag, RunsAlongTheSurfaceAndTurnsWithTheBurr) {
     auto bone = test::slab(0.5);
     auto setup = quiet();
     setup.params.effects.left_handed = left;
-    HapticRenderer r(setup, bone, nullptr, 1e-3);
+    HapticRenderer r(setup, bone, {}, 1e-3);
     const Vec3 f = settled(r, bone, at({0, 0, 1.4}, {1, 0, 0}, true), 10);
     EXPECT_NEAR(std::abs(f.y), setup.params.effects.drag * r.contact().normal_force_n, 0.05);
     EXPECT_NEAR(f.x, 0, 0.05);
@@ -49,7 +49,7 @@ TEST(Drag, RunsAlongTheSurfaceAndTurnsWithTheBurr) {
   }
   EXPECT_LT(sideways[0] * sideways[1], 0);
   auto bone = test::slab(0.5);
-  HapticRenderer r(quiet(), bone, nullptr, 1e-3);
+  HapticRenderer r(quiet(), bone, {}, 1e-3);
   const Vec3 f = settled(r, bone, at({0, 0, 1.4}, {0, 0, 1}, true), 10);
   EXPECT_LT(std::hypot(f.x, f.y), 0.05);
 }
@@ -58,7 +58,7 @@ TEST(Drag, AStandingBurrNeitherDragsNorCuts) {
   auto bone = test::slab(0.5);
   auto setup = quiet();
   setup.params.effects.speed_rpm = 0;
-  HapticRenderer r(setup, bone, nullptr, 1e-3);
+  HapticRenderer r(setup, bone, {}, 1e-3);
   const double before = bone.sum();
   const Vec3 f = settled(r, bone, at({0, 0, 1.4}, {1, 0, 0}, true));
   EXPECT_NEAR(f.y, 0, 0.02);
@@ -110,7 +110,7 @@ TEST(Vibration, TheFileIsCheckedWithThePlace) {
 
 TEST(Shaft, CollidesAndTurnsTheHand) {
   auto bone = test::slab(0.5);
-  HapticRenderer r(quiet(), bone, nullptr, 1e-3);
+  HapticRenderer r(quiet(), bone, {}, 1e-3);
   // Burr in the air beyond the slab's edge, shaft lying across its top: pushed up, and turned about the burr.
   const auto pose = at({-24, 0, 0.9}, {1, 0, 0}, false);
   const Vec3 f = settled(r, bone, pose);
@@ -120,19 +120,19 @@ TEST(Shaft, CollidesAndTurnsTheHand) {
   EXPECT_LT(record.torque_n_mm[1], -10);  // lever along +x, push along +z
   auto setup = quiet();
   setup.params.effects.shaft = false;
-  HapticRenderer without(setup, bone, nullptr, 1e-3);
+  HapticRenderer without(setup, bone, {}, 1e-3);
   EXPECT_EQ(length(settled(without, bone, pose)), 0);
 }
 
 // A cylinder lying on bone with its upper half over the edge is turned.
 TEST(Torque, ComesFromWhereTheBoneIs) {
   auto bone = test::slab(0.5);
-  HapticRenderer r(quiet(), bone, nullptr, 1e-3);
+  HapticRenderer r(quiet(), bone, {}, 1e-3);
   const int cylinder = burr_index(BurrKind::cutting, 4, BurrShape::cylinder);
   const auto on_tip = at({19, 0, 1.6}, {1, 0, 0}, false, cylinder), on_end = at({-25, 0, 1.6}, {1, 0, 0}, false, cylinder);
   static_cast<void>(settled(r, bone, on_tip));
   const double tip = r.contact().torque_n_mm.y, tip_force = r.contact().force_n.z;
-  HapticRenderer r2(quiet(), bone, nullptr, 1e-3);
+  HapticRenderer r2(quiet(), bone, {}, 1e-3);
   static_cast<void>(settled(r2, bone, on_end));
   const double end = r2.contact().torque_n_mm.y, end_force = r2.contact().force_n.z;
   EXPECT_GT(tip_force, 0.5);
@@ -146,7 +146,7 @@ TEST(CurveFixture, HoldsTheHandOnItsCurve) {
   auto setup = quiet();
   setup.curve = {{-10, 0, 10}, {10, 0, 10}};
   setup.curve_params.stiffness_n_per_mm = 0.5;
-  HapticRenderer r(setup, bone, nullptr, 1e-3);
+  HapticRenderer r(setup, bone, {}, 1e-3);
   const auto pose = at({2, 3, 10}, {0, 0, 1}, false);
   const Vec3 f = settled(r, bone, pose);
   EXPECT_NEAR(f.y, -1.5, 1e-3);
@@ -158,11 +158,45 @@ TEST(Stiffness, IsWhatTheDeviceBears) {
   HapticSetup setup;
   setup.params.contact.stiffness_n_per_mm = 4;
   setup.device = {.damping_n_s_per_m = 1, .delay_s = 5e-3, .encoder_mm = 0, .max_force_n = 8, .max_stiffness_n_per_mm = 1e9};
-  const HapticRenderer slow(setup, bone, nullptr, 1e-3);
+  const HapticRenderer slow(setup, bone, {}, 1e-3);
   EXPECT_NEAR(slow.stiffness_n_per_mm(), 0.5 * 2 / 5.5, 1e-9);
   setup.device.delay_s = 0;
-  const HapticRenderer quick(setup, bone, nullptr, 1e-4);
+  const HapticRenderer quick(setup, bone, {}, 1e-4);
   EXPECT_EQ(quick.stiffness_n_per_mm(), 4);
+}
+
+// A nerve 3 mm under the surface: how near the burr is, how thick the bone above it, and what happens when it is met.
+TEST(Structures, ClearanceThicknessAndInjury) {
+  Labels labels;
+  labels.frame.dims = {80, 80, 80};
+  labels.frame.spacing_mm = {0.5, 0.5, 0.5};
+  labels.frame.origin_mm = {-20, -20, -30};
+  const auto v = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  std::size_t n = 0;
+  for (int k = 0; k < 80; ++k)
+    for (int j = 0; j < 80; ++j)
+      for (int i = 0; i < 80; ++i, ++n) {
+        const Vec3 p = labels.frame.world_from_index({double(i), double(j), double(k)});
+        v[n] = std::hypot(p.y, p.z + 4) < 1 ? 6 : 0;  // along x, its top at z = -3
+      }
+  labels.voxels = v;
+  labels.structures = {{6, "facial nerve", {}}};
+  auto bone = test::slab(0.5);
+  HapticRenderer r(quiet(), bone, {nullptr, std::make_shared<const StructureMap>(labels)}, 1e-3);
+  TickRecord record;
+  for (int t = 0; t < 200; ++t) record = r.step(bone, at({0, 0, 5 - 0.018 * t}, {1, 0, 0}, false)).record;
+  EXPECT_EQ(record.structure, 6u);
+  EXPECT_NEAR(record.clearance_mm, 3, 0.5);  // the tool is shown at the surface, 3 mm above
+  EXPECT_EQ(record.flags & (kStructureTouched | kStructureInjured), 0u);
+  EXPECT_EQ(record.thickness_mm, 10);  // the slab is thicker than the reach
+  // The bone above it gone, the burr comes down on the nerve.
+  for (std::uint32_t key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) bone.set(key, 0);
+  for (int t = 0; t < 300; ++t) record = r.step(bone, at({0, 0, 1.4 - 0.012 * t}, {1, 0, 0}, false)).record;
+  EXPECT_LT(record.clearance_mm, 0);
+  EXPECT_NE(record.flags & kStructureTouched, 0u);
+  EXPECT_EQ(record.flags & kStructureInjured, 0u);
+  record = r.step(bone, at({0, 0, -2.2}, {1, 0, 0}, true)).record;
+  EXPECT_NE(record.flags & kStructureInjured, 0u);
 }
 
 }  // namespace

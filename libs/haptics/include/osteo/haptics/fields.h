@@ -53,8 +53,8 @@ class MeshField {
  private:
   TriangleSoup soup_;
   TriangleTree tree_;
-  std::vector<Vec3> face_normal_, corner_normal_;          // unit
-  std::vector<std::array<Vec3, 3>> edge_normal_;           // ab, bc, ca of each triangle
+  std::vector<Vec3> face_normal_, corner_normal_;  // unit
+  std::vector<std::array<Vec3, 3>> edge_normal_;   // ab, bc, ca of each triangle
   bool shading_ = false;
   double radius_mm_ = 0, size_mm_ = 0;
   mutable std::uint32_t hint_ = ClosestPoint::kNone;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "osteo/bone/depth_map.h"
+#include "osteo/bone/structure_map.h"
 #include "osteo/haptics/contact.h"
 #include "osteo/haptics/curve_constraint.h"
 #include "osteo/haptics/guard.h"
@@ -50,9 +51,16 @@ struct HapticSetup {
   HapticsParams params;
   DeviceTraits device;
   bool hardness = false;    ///< removal goes by the HU of the case
+  std::string structures;   ///< hash of the structures at risk that are watched; empty: none
   std::vector<Vec3> curve;  ///< points of a virtual fixture in mm; fewer than 2: none
   CurveConstraintParams curve_params;
   std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
+};
+
+/// What is known of the patient besides bone; what is null costs nothing.
+struct Anatomy {
+  std::shared_ptr<const Hardness> hardness;
+  std::shared_ptr<const StructureMap> structures;
 };
 
 /// Pose to force and removal. Made for one bone; owns all buffers. step() neither allocates nor locks nor throws, and the same sequence
@@ -62,8 +70,8 @@ struct HapticSetup {
 /// vibration, both motor-driven; a curve's pull. Then the limits of Guard.
 class HapticRenderer {
  public:
-  /// `hardness` may be null. Errors: usage, when the vibration's text is not valid.
-  HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, std::shared_ptr<const Hardness> hardness, double dt_s);
+  /// What the scene knows of the patient besides bone may be null. Errors: usage, when the vibration's text is not valid.
+  HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, const Anatomy& anatomy, double dt_s);
   ~HapticRenderer();
 
   struct Step {
@@ -81,7 +89,7 @@ class HapticRenderer {
   void escape(Vec3 at_mm, const Burr& burr) noexcept;
 
   HapticsParams params_;
-  std::shared_ptr<const Hardness> hardness_;
+  Anatomy anatomy_;
   double dt_s_;
   std::unique_ptr<ContactModel> model_;
   Removal removal_;

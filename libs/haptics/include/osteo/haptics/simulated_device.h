@@ -10,12 +10,12 @@ namespace osteo {
 struct SimulatedDeviceParams {
   double mass_kg = 0.1;
   double damping_n_s_per_m = 1;
-  double friction_n = 0;         ///< Coulomb
-  double encoder_mm = 0;         ///< quantum of the reported position
-  double delay_s = 0;            ///< from a pose to the force that answers it
-  double late_share = 0;         ///< of ticks that come 1 to 3 ms late; the force of the tick before stays meanwhile
+  double friction_n = 0;  ///< Coulomb
+  double encoder_mm = 0;  ///< quantum of the reported position
+  double delay_s = 0;     ///< from a pose to the force that answers it
+  double late_share = 0;  ///< of ticks that come 1 to 3 ms late; the force of the tick before stays meanwhile
   double hand_damping_n_s_per_m = 0;
-  std::uint64_t seed = 1;        ///< of which ticks are late
+  std::uint64_t seed = 1;  ///< of which ticks are late
 };
 
 /// A body in three dimensions, driven by the force of the servo and that of a hand, integrated in steps of 20 us (semi-implicit Euler,
@@ -37,9 +37,7 @@ class SimulatedDevice final : public Device {
   }
 
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
-  [[nodiscard]] DeviceTraits traits() const override {
-    return {params_.damping_n_s_per_m, params_.delay_s, params_.encoder_mm, 100, 1e9};
-  }
+  [[nodiscard]] DeviceTraits traits() const override { return {params_.damping_n_s_per_m, params_.delay_s, params_.encoder_mm, 100, 1e9}; }
 
   [[nodiscard]] Vec3 position_mm() const { return x_mm_; }
   [[nodiscard]] Vec3 velocity_mm_s() const { return v_mm_s_; }
@@ -55,7 +53,7 @@ class SimulatedDevice final : public Device {
   std::array<float, 3> axis_{0, 0, 1};
   bool drill_ = false;
   std::uint8_t tool_ = 3;
-  static constexpr int kLongestDelay = 128;  // ticks
+  static constexpr int kLongestDelay = 128;   // ticks
   std::array<Vec3, kLongestDelay> forces_{};  // a ring, for the delay
   int newest_ = 0;
   std::uint64_t random_ = 0;

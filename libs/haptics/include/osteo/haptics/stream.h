@@ -24,15 +24,17 @@ static_assert(sizeof(DeviceSample) == 28);
 
 /// What happened in a tick, as bits of TickRecord::flags.
 enum TickFlag : std::uint32_t {
-  kPoseInvalid = 1,    ///< not finite: the last good pose stood in
-  kPoseJumped = 2,     ///< farther than a hand moves in a tick: force begins again from nothing
-  kPoseStale = 4,      ///< the device has not reported for a while: force fades out
-  kForceCapped = 8,    ///< the limit of the force was reached
-  kRateCapped = 16,    ///< the limit of its rate was
-  kPassivity = 32,     ///< the passivity controller took energy out
-  kShaftContact = 64,  ///< the shaft touches bone
-  kEscape = 128,       ///< too deep for a direction of its own: pushed along the distance map
-  kCurveHeld = 256,    ///< the curve constraint holds
+  kPoseInvalid = 1,          ///< not finite: the last good pose stood in
+  kPoseJumped = 2,           ///< farther than a hand moves in a tick: force begins again from nothing
+  kPoseStale = 4,            ///< the device has not reported for a while: force fades out
+  kForceCapped = 8,          ///< the limit of the force was reached
+  kRateCapped = 16,          ///< the limit of its rate was
+  kPassivity = 32,           ///< the passivity controller took energy out
+  kShaftContact = 64,        ///< the shaft touches bone
+  kEscape = 128,             ///< too deep for a direction of its own: pushed along the distance map
+  kCurveHeld = 256,          ///< the curve constraint holds
+  kStructureTouched = 512,   ///< the burr reaches a structure at risk
+  kStructureInjured = 1024,  ///< and it turns
 };
 
 /// One tick, as it is written to session files (little endian).
@@ -46,13 +48,15 @@ struct TickRecord {
   float depth_mm = 0;                      ///< equivalent penetration of the burr
   float removed_mm3 = 0;                   ///< in this tick
   std::uint32_t voxels_changed = 0;
-  std::uint32_t immersed = 0;  ///< voxels (or samples) of bone in the burr
-  std::uint32_t flags = 0;     ///< TickFlag
-  float energy_mj = 0;         ///< the passivity observer's: positive, the contact gave more than it took
+  std::uint32_t immersed = 0;   ///< voxels (or samples) of bone in the burr
+  std::uint32_t flags = 0;      ///< TickFlag
+  float energy_mj = 0;          ///< the passivity observer's: positive, the contact gave more than it took
+  float thickness_mm = 0;       ///< of the bone that the burr presses on, along the push; 0 without contact, at most 10
+  float clearance_mm = 0;       ///< to the nearest structure at risk; negative inside; 0 where the scene has none
+  std::uint32_t structure = 0;  ///< which that is: its value in the label map; 0: none within reach
   // Below: how the machine did. Not part of what replay must repeat.
   float work_us = 0;
   float lateness_us = 0;
-  std::uint32_t reserved[3]{};
 };
 static_assert(sizeof(TickRecord) == 120);
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -17,7 +18,7 @@ namespace osteo {
 struct RehearsalOptions {
   double rate_hz = 1000;
   HapticSetup haptics;
-  std::shared_ptr<const Hardness> hardness;  ///< where haptics.hardness is set
+  Anatomy anatomy;  ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
   bool follow_surface = true;
 };
@@ -28,6 +29,12 @@ struct RehearsalSummary {
   std::string bone_hash, surface_hash;
   std::uint64_t dropped = 0;  ///< ticks that a reader lost
   std::uint64_t session_bytes = 0;
+  /// What the burr did near structures at risk, by their value; empty where the scene has none.
+  struct StructureEvents {
+    double least_clearance_mm = 0;
+    std::uint64_t ticks_touched = 0, ticks_injured = 0;
+  };
+  std::map<std::uint32_t, StructureEvents> structures;
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
 };
 
@@ -53,6 +60,8 @@ class Rehearsal {
   [[nodiscard]] double removed_mm3() const;
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
   [[nodiscard]] const BrickGrid& bone() const { return bone_; }
+  /// Null where the scene has none.
+  [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
   [[nodiscard]] double stiffness_n_per_mm() const { return renderer_.stiffness_n_per_mm(); }
   [[nodiscard]] Device& device() { return *device_; }
@@ -74,6 +83,7 @@ class Rehearsal {
   Servo servo_;
   Seqlock<TickRecord> latest_;
   std::atomic<double> removed_mm3_{0};
+  std::map<std::uint32_t, RehearsalSummary::StructureEvents> structure_events_;  // of the follower
   std::unique_ptr<FixedRateLoop> loop_;
   std::mutex surface_mutex_;
   std::unique_ptr<LiveSurface> surface_;
@@ -97,8 +107,8 @@ struct ReplayResult {
 
 /// Runs the recorded poses through the same servo on `bone`, which is left as the session left it.
 /// Error(corrupt) when the session belongs to another bone.
-/// `hardness` as the session had it; null when its header wants none.
-[[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, std::shared_ptr<const Hardness> hardness, const Context& context);
+/// `anatomy` as the session had it. Error(corrupt), Error(usage) when it is not.
+[[nodiscard]] ReplayResult replay(const Session& session, BrickGrid& bone, const Anatomy& anatomy, const Context& context);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
 /// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.

@@ -32,10 +32,11 @@ struct SessionFolder {
 
 /// Settings from `file`, or where that is empty from haptics.json of the case where there is one.
 void apply_haptic_settings(const std::filesystem::path& case_folder, const std::filesystem::path& file, HapticSetup& setup);
-/// From the HU of the case; Error(no_input) when it has none.
-[[nodiscard]] std::shared_ptr<const Hardness> hardness_of(const Case& the_case, const BrickGrid& bone);
+/// What the case knows besides bone, as the setup asks for it; names the structures in the setup. Errors: no_input (hardness asked, no HU).
+[[nodiscard]] Anatomy anatomy_of(const Case& the_case, const BrickGrid& bone, HapticSetup& setup, const Context& context);
 
 /// Writes summary.json and returns its text.
-std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr);
+std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr,
+                          const Anatomy& anatomy = {});
 
 }  // namespace osteo

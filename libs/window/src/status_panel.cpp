@@ -1,0 +1,52 @@
+#include "status_panel.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace osteo {
+namespace {
+
+constexpr double kDisplayForceN = 4;  // full length of the force bar
+constexpr double kWarnMm = 2, kAlarmMm = 0.5;
+const ImVec4 kAmber(1.0F, 0.8F, 0.35F, 1), kRed(1.0F, 0.45F, 0.35F, 1);
+
+}  // namespace
+
+void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
+  const double force =
+      std::hypot(static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2]));
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2f N", force);
+  ImGui::Text("Force");
+  const float share = static_cast<float>(std::min(1.0, force / kDisplayForceN));
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImVec4(0.3F + 0.65F * share, 0.75F - 0.5F * share, 0.25F, 1));
+  ImGui::ProgressBar(share, {-1, 22}, text);
+  ImGui::PopStyleColor();
+  ImGui::Text("Depth of burr in bone  %.2f mm", static_cast<double>(tick.depth_mm));
+  if (tick.thickness_mm > 0)
+    ImGui::Text("Bone under the burr  %s%.1f mm", tick.thickness_mm >= 10 ? "over " : "", static_cast<double>(tick.thickness_mm));
+  if (const StructureMap* const structures = rehearsal.structures()) {
+    const auto clearance = static_cast<double>(tick.clearance_mm);
+    if (tick.structure == 0) {
+      ImGui::Text("No structure within %.0f mm", structures->reach_mm());
+    } else {
+      const ImVec4 colour = clearance < kAlarmMm ? kRed : clearance < kWarnMm ? kAmber : ImGui::GetStyleColorVec4(ImGuiCol_Text);
+      const std::string name = structures->name_of(static_cast<std::uint8_t>(tick.structure));
+      if (clearance <= 0) {
+        ImGui::TextColored(colour, "%s: TOUCHED", name.c_str());
+      } else {
+        ImGui::TextColored(colour, "%s: %.1f mm away", name.c_str(), clearance);
+      }
+    }
+  }
+  if ((tick.flags & kShaftContact) != 0) ImGui::TextColored(kAmber, "the shaft touches bone");
+  if ((tick.flags & kEscape) != 0) ImGui::TextColored(kRed, "the burr is buried in bone");
+  ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
+  const double seconds = static_cast<double>(tick.tick) / rehearsal.rate_hz();
+  ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
+}
+
+}  // namespace osteo
