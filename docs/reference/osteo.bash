@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin curve snapshot structures phantom list info series guide convert run prepare rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin saw pieces curve snapshot structures phantom list info series guide convert run prepare scene rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -15,10 +15,12 @@ _osteo() {
     "voxelize --margin") COMPREPLY=($(compgen -W "exact thesis " -- "$cur")); return ;;
     "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
     "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
+    "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
+    "scene --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
     "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
     "rehearse --shape") COMPREPLY=($(compgen -W "ball cylinder taper " -- "$cur")); return ;;
     "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
@@ -40,6 +42,8 @@ _osteo() {
     voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
+    saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
+    pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --image" ;;
@@ -51,7 +55,8 @@ _osteo() {
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --resume" ;;
+    scene) flags="$flags --settings --contact" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --pieces --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     devices) flags="$flags --watch --recording" ;;

@@ -20,6 +20,9 @@
 #include "ball.h"
 #include "bench.h"
 #include "osteo/bone/live_surface.h"
+#include "osteo/bone/pieces.h"
+#include "osteo/bone/saw.h"
+#include "osteo/bone/thickness.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
@@ -229,12 +232,106 @@ void bench_surface(const Context& context) {
       1000 * times[200], 1000 * times[395], 1000 * rebuild);
 }
 
+// Pieces: from the last connecting voxel's removal to the answer, beside a flood fill of everything.
+void bench_pieces(const Context& context) {
+  const Phantom phantom = make_phantom(PhantomParams{}, context);
+  ThresholdParams t;
+  t.lower = 500;
+  ResampleParams r;
+  r.spacing_mm = 0.5;
+  const BrickGrid whole = to_bricks(resample_bone(phantom.ct, threshold(phantom.ct, t), r, context).density);
+  const auto& n = whole.frame().dims;
+  std::printf("## Pieces: phantom head at 0.5 mm, %zu bricks\n\n| what | ms | result |\n|---|---|---|\n", whole.brick_count());
+  std::unique_ptr<LiveComponents> live;
+  BrickGrid bone = whole;
+  const double all = seconds([&] { live = std::make_unique<LiveComponents>(bone); }, 1);
+  std::printf("| label everything | %.1f | %zu parts, %.1f MB |\n", 1000 * all, live->update().size(),
+              static_cast<double>(live->memory_bytes()) / 1e6);
+  // A burr of 6 mm nibbles along the bone: 27 bricks at most change.
+  std::mt19937 random(4);
+  std::vector<double> updates;
+  for (int e = 0; e < 300; ++e) {
+    VoxelKey centre = 0;
+    do centre = static_cast<VoxelKey>(random() % (bone.brick_count() * BrickGrid::kVoxels));
+    while (bone.value(centre) < 0.5F);
+    const Ijk c = bone.coordinate(centre);
+    for (int k = -6; k <= 6; ++k)
+      for (int j = -6; j <= 6; ++j)
+        for (int i = -6; i <= 6; ++i) {
+          const VoxelKey v = bone.find(c.i + i, c.j + j, c.k + k);
+          if (v == BrickGrid::kNone || i * i + j * j + k * k > 36) continue;
+          bone.set(v, 0);
+          live->mark(v);
+        }
+    updates.push_back(seconds([&] { static_cast<void>(live->update()); }, 1));
+  }
+  std::sort(updates.begin(), updates.end());
+  std::printf("| after a bite of a 6 mm burr | %.2f (p50), %.2f (p99) | %zu parts |\n", 1000 * updates[150], 1000 * updates[297],
+              live->update().size());
+  bone = BrickGrid(whole);
+  std::vector<VoxelKey> changed;
+  double removed = 0;
+  const double saw = seconds([&] { removed = apply_saw(bone, {whole.frame().centre_mm(), {0, 0.3, 1}, {1, 0, 0}, 1}, changed); }, 1);
+  std::printf("| saw through the whole head | %.1f | %zu voxels, %.0f mm3 |\n", 1000 * saw, changed.size(), removed);
+  live = std::make_unique<LiveComponents>(whole);
+  LiveComponents cut(bone);
+  for (const VoxelKey v : changed) cut.mark(v);
+  const double relabel = seconds([&] { static_cast<void>(cut.update()); }, 1);
+  std::printf("| the parts after it, from its voxels alone | %.1f | %zu parts |\n", 1000 * relabel, cut.update().size());
+  Split split;
+  const double apart = seconds([&] { split = split_bone(bone, 50); }, 1);
+  std::printf("| pieces with bone of their own, from nothing | %.1f | %zu pieces, %llu crumbs |\n", 1000 * apart, split.pieces.size(),
+              static_cast<unsigned long long>(split.crumbs));
+  std::vector<std::uint8_t> mask(whole.frame().voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) mask[at++] = bone.at(i, j, k) >= 0.5F ? 1 : 0;
+  std::size_t parts = 0;
+  const double flood = seconds([&] { parts = connected_components(mask, n, 1, Connectivity::face).voxels.size(); }, 1);
+  std::printf("| flood fill of the dense volume (the thesis' way, by runs) | %.1f | %zu parts |\n", 1000 * flood, parts);
+
+  std::printf(
+      "\n## Thickness: spherical shells, radius 8 mm, voxels 0.4 mm\n\n| shell mm | mean error mm | worst mm | us |\n|---|---|---|---|\n");
+  for (const double thick : {0.8, 1.5, 4.0}) {
+    Frame f;
+    f.dims = {72, 72, 72};
+    f.spacing_mm = {0.4, 0.4, 0.4};
+    f.origin_mm = {-14.2, -14.2, -14.2};
+    std::vector<Ijk> bricks;
+    for (int b = 0; b < 729; ++b) bricks.push_back({b % 9, b / 9 % 9, b / 81});
+    BrickGrid g(f, bricks);
+    for (VoxelKey v = 0; v < g.brick_count() * BrickGrid::kVoxels; ++v) {
+      const Ijk c = g.coordinate(v);
+      int in = 0;
+      for (int s = 0; s < 64; ++s) {
+        const double d =
+            length(f.world_from_index({c.i + ((s & 3) - 1.5) / 4, c.j + ((s >> 2 & 3) - 1.5) / 4, c.k + ((s >> 4) - 1.5) / 4}));
+        in += d > 8 && d < 8 + thick ? 1 : 0;
+      }
+      g.set(v, static_cast<float>(in) / 64);
+    }
+    std::normal_distribution<double> u;
+    double mean = 0, worst = 0, time = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const Vec3 out = normalized({u(random), u(random), u(random)});
+      double found = 0;
+      time += seconds([&] { found = thickness_mm(g, out * (8.4 + thick), -out); }, 1);
+      mean += std::abs(found - thick) / 2000;
+      worst = std::max(worst, std::abs(found - thick));
+    }
+    std::printf("| %g | %.3f | %.3f | %.2f |\n", thick, mean, worst, time / 2000 * 1e6);
+  }
+  std::printf("\n");
+}
+
 }  // namespace
 
 void bench_bone(const Context& context) {
   openvdb::initialize();
   bench_resample(context);
   bench_surface(context);
+  bench_pieces(context);
 }
 
 }  // namespace osteo

@@ -576,7 +576,7 @@ void bench_haptics_fuzz(const Context&) {
         const double a = 0.7 + 0.1 * static_cast<double>(t / 2'000'000 % 5);
         bone = voxels_of(
             {"fuzz", [a](Vec3 p) { return (std::sin(a * p.x) + std::sin(1.3 * a * p.y) + std::sin(0.9 * p.z) - 0.2) * 0.6; }, {}, {}}, 0.5);
-        renderer = std::make_unique<HapticRenderer>(setup, bone, {}, 1e-3);
+        renderer = std::make_unique<HapticRenderer>(setup, bone, Anatomy{}, 1e-3);
         last = {};
       }
       const auto dice = random() % 1000;

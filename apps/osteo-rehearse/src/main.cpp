@@ -123,6 +123,7 @@ struct WindowCommand {
     std::filesystem::path next_folder = p.out, resume_from = p.resume;
     RehearsalOptions options;
     options.rate_hz = p.rate_hz;
+    options.follow_pieces = true;
     const Hands hands(p.device, p.arm);
     options.haptics.params.contact.method = p.contact;
     apply_haptic_settings(the_case.folder, p.settings, options.haptics);

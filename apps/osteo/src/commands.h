@@ -172,6 +172,7 @@ struct RehearseCommand {
     double seconds = 60;
     double rate_hz = 1000;
     bool fast = false;
+    bool pieces = false;
     std::string resume;
   };
   static void describe(Params& p, auto& visit) {
@@ -189,7 +190,21 @@ struct RehearseCommand {
     visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
+    visit({"pieces", "watch whether the bone still hangs together; the summary lists the pieces (the window always does)"}, p.pieces);
     visit({"resume", "go on from the end of this session"}, p.resume);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct SceneCommand {
+  struct Params {
+    std::string settings;
+    ContactMethod contact = ContactMethod::overlap;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"contact", "how the burr feels bone"}, p.contact);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

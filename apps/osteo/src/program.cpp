@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "osteo/bone/stages.h"
 #include "osteo/dicom/import.h"
 #include "osteo/distance/compare.h"
 #include "osteo/distance/stages.h"
@@ -45,6 +46,8 @@ cli::Program make_osteo_program() {
   p.registry.add<VoxelizeStage>();
   p.registry.add<TetrahedralizeStage>();
   p.registry.add<SkinStage>();
+  p.registry.add<SawStage>();
+  p.registry.add<PiecesStage>();
   p.registry.add<CurveStage>();
   p.registry.add<SnapshotStage>();
   p.registry.add<StructuresStage>();
@@ -56,6 +59,7 @@ cli::Program make_osteo_program() {
   p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();
+  p.add<SceneCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
   p.add<ExportCommand>();

@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/bone/live_components.h"
 #include "osteo/cli/report.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
@@ -93,6 +94,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   RehearsalOptions options;
   options.rate_hz = p.rate_hz;
   options.session_file = session.stream();
+  options.follow_pieces = p.pieces;
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
   options.haptics.device = device->traits();
   options.haptics.params.contact.method = p.contact;
@@ -119,7 +121,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const TriMesh after = draw(rehearsal.bone(), "after.png");
   save_surface(after, folder / "surface.ply");
 
-  const std::string summary = write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
+  const std::string summary =
+      write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
   if (!io.common.quiet) {
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
@@ -198,6 +201,95 @@ int ExportCommand::run(const Params&, cli::Invocation& io) {
   io.end_progress();
   if (!io.common.quiet)
     io.err << session.ticks.size() << " ticks written to " << out.string() << (session.end ? "" : " (the session was cut short)") << '\n';
+  return 0;
+}
+
+cli::CommandInfo SceneCommand::info() {
+  return {"scene",
+          "what a rehearsal of a case will build, and what each part costs",
+          "Memory and time to make of every part that the case and the settings list, and the time of a tick while drilling. What is not "
+          "listed is not "
+          "built and costs nothing.",
+          {{"case", "a folder made by prepare"}},
+          "osteo scene CASE"};
+}
+
+int SceneCommand::run(const Params& p, cli::Invocation& io) {
+  const Case the_case = load_case(io.arguments[0]);
+  ordered_json j;
+  j["parts"] = ordered_json::array();
+  const auto timed = [&](const std::string& name, const std::string& thread, auto&& make) {
+    const std::int64_t begin = monotonic_ns();
+    const std::size_t bytes = make();
+    j["parts"].push_back({{"part", name},
+                          {"memory_mb", std::round(static_cast<double>(bytes) / 1e4) / 100},
+                          {"made_in_s", std::round(static_cast<double>(monotonic_ns() - begin) / 1e7) / 100},
+                          {"kept_up_to_date_by", thread}});
+  };
+  BrickGrid bone;
+  timed("bone", "servo", [&] {
+    bone = to_bricks(the_case.bone);
+    return bone.memory_bytes();
+  });
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  setup.params.contact.method = p.contact;
+  apply_haptic_settings(the_case.folder, p.settings, setup);
+  Anatomy anatomy;
+  if (setup.hardness || the_case.files.contains("structures")) {
+    timed("hardness and structures at risk", "nobody: they do not change", [&] {
+      anatomy = anatomy_of(the_case, bone, setup, io.context);
+      return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
+    });
+  }
+  if (setup.params.effects.fail_safe) timed("distance map", "servo", [&] { return DepthMap(bone).memory_bytes(); });
+  timed("surface", "follower", [&] {
+    const LiveSurface surface(bone, io.context);
+    std::size_t bytes = 0;
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+      const SurfacePatch& patch = surface.patch(b);
+      bytes += sizeof patch + patch.memory_bytes();
+    }
+    return bytes;
+  });
+  timed("pieces (window, or --pieces)", "follower", [&] { return LiveComponents(bone).memory_bytes(); });
+  std::unique_ptr<HapticRenderer> renderer;
+  timed("haptic renderer: " + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(setup.params.contact.method)]), "servo",
+        [&] {
+          renderer = std::make_unique<HapticRenderer>(setup, bone, anatomy, 1e-3);
+          return std::size_t{0};
+        });
+  // A few seconds of drilling, without a clock.
+  Script script = make_default_script(bone, true, burr_index(BurrKind::cutting, 4), 5);
+  ScriptedDevice device(std::move(script), 1000);
+  Histogram ticks;
+  Vec3 force{};
+  for (std::uint64_t t = 0; device.active(t); ++t) {
+    const DeviceSample sample = device.read(t, 1e-3, force);
+    const std::int64_t begin = monotonic_ns();
+    const auto [record, changes] = renderer->step(bone, sample);
+    ticks.add(monotonic_ns() - begin);
+    force = {static_cast<double>(record.force_n[0]), static_cast<double>(record.force_n[1]), static_cast<double>(record.force_n[2])};
+  }
+  j["tick_us"] = {{"p50_us", ticks.quantile_us(0.5)}, {"p99_us", ticks.quantile_us(0.99)}, {"p99_9_us", ticks.quantile_us(0.999)}};
+  j["threads"] = {"servo (real time)", "recorder", "follower (surface, pieces)", "window"};
+  double megabytes = 0;
+  for (const auto& part : j["parts"]) megabytes += part["memory_mb"].get<double>();
+  j["memory_mb"] = std::round(megabytes * 10) / 10;
+  io.end_progress();
+  if (io.common.json) {
+    io.out << j.dump(2) << '\n';
+    return 0;
+  }
+  for (const auto& part : j["parts"]) {
+    char line[160];
+    std::snprintf(line, sizeof line, "%-34s %8.2f MB  made in %5.2f s  %s\n", part["part"].get<std::string>().c_str(),
+                  part["memory_mb"].get<double>(), part["made_in_s"].get<double>(), part["kept_up_to_date_by"].get<std::string>().c_str());
+    io.out << line;
+  }
+  io.out << "together " << format_number(j["memory_mb"]) << " MB; a tick while drilling takes " << format_number(ticks.quantile_us(0.5))
+         << " us, p99 " << format_number(ticks.quantile_us(0.99)) << " us, p99.9 " << format_number(ticks.quantile_us(0.999)) << " us\n"
+         << "threads: servo (real time), recorder, follower (surface, pieces), window\n";
   return 0;
 }
 

@@ -27,9 +27,13 @@ Rehearsal::Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const Rehea
     header.haptics = options_.haptics;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(), options_.session_file, header);
   }
+  if (options_.follow_pieces) {
+    components_ = std::make_unique<LiveComponents>(bone_);
+    pieces_ = static_cast<int>(large_pieces().size());
+  }
+  if (options_.follow_surface || options_.follow_pieces) surface_reader_ = &stream_.add_reader();
   if (options_.follow_surface) {
     surface_ = std::make_unique<LiveSurface>(bone_, context);
-    surface_reader_ = &stream_.add_reader();
   }
 }
 
@@ -45,6 +49,16 @@ double Rehearsal::removed_mm3() const {
 }
 bool Rehearsal::running() const {
   return loop_ && loop_->running();
+}
+
+std::vector<LiveComponents::Component> Rehearsal::large_pieces() {
+  std::vector<LiveComponents::Component> large;
+  const double voxel_mm3 = bone_.frame().voxel_volume_mm3();
+  for (const auto& c : components_->update()) {
+    if (c.mass * voxel_mm3 >= kLeastPieceMm3) large.push_back(c);
+  }
+  std::stable_sort(large.begin(), large.end(), [](const auto& a, const auto& b) { return a.mass > b.mass; });
+  return large;
 }
 
 std::size_t Rehearsal::drain_surface() {
@@ -67,12 +81,18 @@ std::size_t Rehearsal::drain_surface() {
     }
     if (wanted > change_buffer_.size()) change_buffer_.resize(wanted);
     const std::size_t got = surface_reader_->changes.pop({change_buffer_.data(), wanted});
-    for (std::size_t c = 0; c < got; ++c) surface_->mark(change_buffer_[c].voxel);
+    for (std::size_t c = 0; c < got; ++c) {
+      if (surface_) surface_->mark(change_buffer_[c].voxel);
+      if (components_) components_->mark(change_buffer_[c].voxel);
+    }
     removed_mm3_ = removed_mm3_ + removed;
     latest_.store(tick_buffer_[n - 1]);
     total += n;
   }
-  for (const std::uint32_t b : surface_->update()) changed_bricks_.insert(b);
+  if (surface_) {
+    for (const std::uint32_t b : surface_->update()) changed_bricks_.insert(b);
+  }
+  if (components_ && total > 0) pieces_ = static_cast<int>(large_pieces().size());
   return total;
 }
 
@@ -86,7 +106,7 @@ void Rehearsal::follow() {
 void Rehearsal::start() {
   loop_ = std::make_unique<FixedRateLoop>(options_.rate_hz, [this](std::int64_t lateness_ns) { return servo_.step(lateness_ns); });
   if (recorder_) recorder_->start();
-  if (surface_) follower_ = std::thread([this] { follow(); });
+  if (surface_reader_ != nullptr) follower_ = std::thread([this] { follow(); });
   loop_->start();
 }
 
@@ -119,8 +139,9 @@ RehearsalSummary Rehearsal::finish() {
   s.bone_hash = bone_.hash();
   if (surface_) {
     s.surface_hash = surface_hash(surface_->joined().mesh);
-    s.dropped = surface_reader_->dropped;
   }
+  if (surface_reader_ != nullptr) s.dropped = surface_reader_->dropped;
+  if (components_) s.pieces = large_pieces();
   if (recorder_) {
     if (recorder_->failure()) throw Error(*recorder_->failure());
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3});

@@ -51,6 +51,9 @@ struct SurfacePatch {
   std::vector<Vertex> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint16_t> voxel_of_triangle;  ///< place in the brick of the bone voxel that the triangle closes
+  [[nodiscard]] std::size_t memory_bytes() const {
+    return vertices.capacity() * sizeof(Vertex) + triangles.capacity() * sizeof(triangles[0]) + voxel_of_triangle.capacity() * 2;
+  }
 };
 [[nodiscard]] SurfacePatch extract_patch(const BrickGrid& bone, std::uint32_t brick, float iso = 0.5F);
 /// The same, reusing the memory of `patch`.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "osteo/bone/live_components.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/haptics/servo.h"
 #include "osteo/rt/loop.h"
@@ -21,6 +22,7 @@ struct RehearsalOptions {
   Anatomy anatomy;  ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
   bool follow_surface = true;
+  bool follow_pieces = false;  ///< watch whether the bone still hangs together
 };
 
 struct RehearsalSummary {
@@ -35,6 +37,7 @@ struct RehearsalSummary {
     std::uint64_t ticks_touched = 0, ticks_injured = 0;
   };
   std::map<std::uint32_t, StructureEvents> structures;
+  std::vector<LiveComponents::Component> pieces;  ///< of at least kLeastPieceMm3, largest first; empty unless they were followed
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
 };
 
@@ -60,6 +63,9 @@ class Rehearsal {
   [[nodiscard]] double removed_mm3() const;
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
   [[nodiscard]] const BrickGrid& bone() const { return bone_; }
+  /// Parts of the bone that hang together, of at least kLeastPieceMm3, as last seen; 0 unless they are followed.
+  [[nodiscard]] int pieces() const { return pieces_; }
+  static constexpr double kLeastPieceMm3 = 50;
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
@@ -71,6 +77,7 @@ class Rehearsal {
  private:
   void follow();
   std::size_t drain_surface();
+  std::vector<LiveComponents::Component> large_pieces();
   RehearsalSummary finish();
 
   BrickGrid bone_;
@@ -87,6 +94,8 @@ class Rehearsal {
   std::unique_ptr<FixedRateLoop> loop_;
   std::mutex surface_mutex_;
   std::unique_ptr<LiveSurface> surface_;
+  std::unique_ptr<LiveComponents> components_;
+  std::atomic<int> pieces_{0};
   std::set<std::uint32_t> changed_bricks_;
   std::vector<TickRecord> tick_buffer_;
   std::vector<VoxelChange> change_buffer_;
