@@ -54,6 +54,8 @@ class BurrProxy final : public ContactModel {
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
 
+  void rest() noexcept override { proxy_.forget(); }
+
  private:
   ContactParams params_;
   double spacing_mm_;

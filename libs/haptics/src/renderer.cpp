@@ -31,10 +31,20 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, 
     : params_(made_safe(setup.params, setup.device, dt_s)),
       anatomy_(anatomy),
       dt_s_(dt_s),
-      model_(make_contact_model(params_.contact, bone.frame().spacing_mm.x)),
       removal_(most_hits(bone.frame().spacing_mm.x)),
       vibration_(setup.vibration_json.empty() ? default_vibration() : parse_vibration(setup.vibration_json, "the session's vibration")),
       guard_(params_.guard, setup.device) {
+  method_of_tool_.assign(burr_library().size(), params_.contact.method);
+  for (const auto& [tool, method] : setup.tool_methods) {
+    if (tool >= 0 && tool < static_cast<int>(method_of_tool_.size())) method_of_tool_[static_cast<std::size_t>(tool)] = method;
+  }
+  for (const ContactMethod method : method_of_tool_) {
+    auto& model = models_[static_cast<std::size_t>(method)];
+    if (model) continue;
+    ContactParams p = params_.contact;
+    p.method = method;
+    model = make_contact_model(p, bone.frame().spacing_mm.x);
+  }
   if (params_.effects.fail_safe) {
     depth_map_ = std::make_unique<DepthMap>(bone);
     changed_.resize(most_hits(bone.frame().spacing_mm.x));
@@ -52,7 +62,7 @@ void HapticRenderer::escape(Vec3 at_mm, const Burr& burr) noexcept {
   const RoundCone head = burr.head();
   const double full = contact_.bone_mm3 / head.volume_mm3();
   const double share = std::clamp((full - kEscapeFrom) / (kEscapeAll - kEscapeFrom), 0.0, 1.0);
-  if (share <= 0 || params_.contact.method == ContactMethod::proxy) return;
+  if (share <= 0 || method_of_tool_[last_good_.tool] == ContactMethod::proxy) return;
   const DepthMap::Answer out = depth_map_->at(at_mm);
   if (out.outwards == Vec3{}) return;
   const double law = params_.contact.force_n(out.depth_mm + head.largest_radius_mm());
@@ -89,6 +99,9 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   }
   const Vec3 at = position_of(pose), axis = axis_of(pose);
   const Burr& burr = burr_library()[pose.tool];
+  ContactModel* const model = models_[static_cast<std::size_t>(method_of_tool_[pose.tool])].get();
+  if (model_ != nullptr && model != model_) model_->rest();
+  model_ = model;
   contact_ = usable ? model_->contact(bone, pose) : ContactResult{};
   if (depth_map_ && contact_.bone_mm3 > 0) escape(at, burr);
 
@@ -144,7 +157,8 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
     const auto near = anatomy_.structures->clearance(burr.head(), at + contact_.shown_offset_mm, axis);
     r.clearance_mm = static_cast<float>(near.distance_mm);
     r.structure = near.structure;
-    if (near.structure != 0 && near.distance_mm <= 0) flags_ |= kStructureTouched | (pose.drill_on != 0 ? static_cast<std::uint32_t>(kStructureInjured) : 0U);
+    if (near.structure != 0 && near.distance_mm <= 0)
+      flags_ |= kStructureTouched | (pose.drill_on != 0 ? static_cast<std::uint32_t>(kStructureInjured) : 0U);
   }
 
   double removed = 0;

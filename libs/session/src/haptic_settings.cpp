@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -33,6 +34,35 @@ std::string text_of(const ordered_json& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
+// { "diamond": "proxy", "cutting taper": "volume" }: a burr is meant when its name holds all of the words.
+void set_tool_methods(const ordered_json& tools, const std::string& name, HapticSetup& setup) {
+  for (const auto& [words, method_name] : tools.items()) {
+    ContactMethod method{};
+    detail::FieldCollector collect;
+    collect({"tools", "method of contact"}, method);
+    try {
+      collect.fields.front().from_text(method_name.get<std::string>());
+    } catch (const Error& e) {
+      throw e.in(name + ": tools: " + words);
+    }
+    bool any = false;
+    for (std::size_t t = 0; t < burr_library().size(); ++t) {
+      const Burr& b = burr_library()[t];
+      // Balls do not say so in their name.
+      const std::string burr = " " + b.name() + (b.shape == BurrShape::ball ? " ball " : " ");
+      std::istringstream in(words);
+      bool all = true;
+      for (std::string word; in >> word;) all = all && burr.find(" " + word + " ") != std::string::npos;
+      if (!all) continue;
+      setup.tool_methods[static_cast<int>(t)] = method;
+      any = true;
+    }
+    if (!any)
+      throw Error(ExitCode::usage, name + ": tools: no burr is a \"" + words + "\"",
+                  "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm");
+  }
+}
+
 }  // namespace
 
 void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
@@ -45,7 +75,9 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
     for (const auto& [key, value] : j.items()) {
       if (key == "osteotome_haptics") continue;
       const auto beside = [&] { return path.parent_path() / value.get<std::string>(); };
-      if (key == "hardness") {
+      if (key == "tools") {
+        set_tool_methods(value, name, setup);
+      } else if (key == "hardness") {
         setup.hardness = value.get<bool>();
       } else if (key == "curve_file") {
         setup.curve = load_points(beside());
@@ -56,7 +88,7 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
       } else {
         const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
         if (f == fields.end()) {
-          std::vector<std::string> known{"hardness", "curve_file", "vibration_file"};
+          std::vector<std::string> known{"tools", "hardness", "curve_file", "vibration_file"};
           for (const FieldRef& r : fields) known.emplace_back(r.doc.name);
           const std::string near = nearest_name(key, known);
           throw Error(ExitCode::usage, name + " has no setting \"" + key + "\"" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),

@@ -57,6 +57,8 @@ ordered_json to_json(const HapticSetup& h) {
                  {"encoder_mm", h.device.encoder_mm},
                  {"max_force_n", h.device.max_force_n},
                  {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
+  j["tool_methods"] = ordered_json::array();
+  for (const auto& [tool, method] : h.tool_methods) j["tool_methods"].push_back({tool, static_cast<int>(method)});
   j["hardness"] = h.hardness;
   j["structures"] = h.structures;
   j["vibration"] = h.vibration_json;
@@ -72,6 +74,12 @@ HapticSetup setup_of(const ordered_json& j) {
   read_fields(fields_of<HapticsParams>(h.params), j.at("params"));
   const auto& d = j.at("device");
   h.device = {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
+  for (const auto& t : j.at("tool_methods")) {
+    const int method = t.at(1);
+    if (method < 0 || method >= static_cast<int>(EnumNames<ContactMethod>::values.size()))
+      throw Error(ExitCode::corrupt, "it names an unknown method of contact");
+    h.tool_methods[t.at(0)] = static_cast<ContactMethod>(method);
+  }
   h.hardness = j.at("hardness");
   h.structures = j.at("structures");
   h.vibration_json = j.at("vibration");

@@ -73,6 +73,8 @@ class ContactModel {
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
   /// What the last contact() would cut; empty when the drill was off. Valid until the next contact().
   [[nodiscard]] virtual Cut cut(const BrickGrid& bone) noexcept = 0;
+  /// Another model is in use now: what this one remembers of the hand is out of date.
+  virtual void rest() noexcept {}
 };
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers.

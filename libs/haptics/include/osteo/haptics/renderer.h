@@ -1,5 +1,6 @@
 // Haptic rendering: all that happens to a pose between the device and the hand, but for the device.
 #pragma once
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,9 +51,10 @@ struct HapticsParams {
 struct HapticSetup {
   HapticsParams params;
   DeviceTraits device;
-  bool hardness = false;    ///< removal goes by the HU of the case
-  std::string structures;   ///< hash of the structures at risk that are watched; empty: none
-  std::vector<Vec3> curve;  ///< points of a virtual fixture in mm; fewer than 2: none
+  std::map<int, ContactMethod> tool_methods;  ///< index in burr_library() -> another method than params.contact.method for that tool
+  bool hardness = false;                      ///< removal goes by the HU of the case
+  std::string structures;                     ///< hash of the structures at risk that are watched; empty: none
+  std::vector<Vec3> curve;                    ///< points of a virtual fixture in mm; fewer than 2: none
   CurveConstraintParams curve_params;
   std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
 };
@@ -91,7 +93,9 @@ class HapticRenderer {
   HapticsParams params_;
   Anatomy anatomy_;
   double dt_s_;
-  std::unique_ptr<ContactModel> model_;
+  std::array<std::unique_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models_;  // those that some tool uses
+  std::vector<ContactMethod> method_of_tool_;
+  ContactModel* model_ = nullptr;  // of the tool in the hand
   Removal removal_;
   std::unique_ptr<DepthMap> depth_map_;
   std::vector<VoxelKey> changed_;
