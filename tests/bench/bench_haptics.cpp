@@ -21,6 +21,7 @@
 #include "osteo/rt/loop.h"
 #include "osteo/session/recorder.h"
 #include "slab.h"
+#include "solid.h"
 #include "stability.h"
 
 namespace osteo {
@@ -63,33 +64,8 @@ Vec3 slope_of(const std::function<double(Vec3)>& f, Vec3 x) {
 }
 
 BrickGrid voxels_of(const Body& body, double h) {
-  Frame f;
-  const double half = 9;
-  const int n = static_cast<int>(std::ceil(2 * half / h / 8)) * 8;
-  f.dims = {n, n, n};
-  f.spacing_mm = {h, h, h};
-  const double lo = -n * h / 2 + h / 2;
-  f.origin_mm = body.centre + Vec3{lo, lo, lo};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const Vec3 c = f.world_from_index({double(i), double(j), double(k)});
-        const double d = body.distance(c);
-        double share = d < 0 ? 1 : 0;
-        if (std::abs(d) < 1.2 * h) {
-          int in = 0;
-          for (int s = 0; s < 512; ++s)
-            in += body.distance(c + Vec3{((s & 7) - 3.5) / 8 * h, ((s >> 3 & 7) - 3.5) / 8 * h, ((s >> 6) - 3.5) / 8 * h}) < 0 ? 1 : 0;
-          share = in / 512.0;
-        }
-        g.set(g.find(i, j, k), static_cast<float>(share));
-      }
-  return g;
+  return test::solid(
+      h, 9, [&](Vec3 p) { return body.distance(p + body.centre) < 0; }, body.centre, 8);
 }
 
 /// Volume of the body in a ball and the push of its surface, by 64^3 points of the ball and 20,000 of its surface: within 0.2 %.
@@ -350,29 +326,7 @@ void bench_removal() {
       "0.35 mm | 1 mm | 500 Hz | 2 kHz | 5 kHz | removed mm3 |\n|---|---|---|---|---|---|---|---|---|\n");
   for (const ContactMethod method : kMethods) {
     for (const int tool : {3, 17, 38}) {
-      const auto drill = [&](double h, double hz) {
-        auto bone = test::slab(h);
-        HapticSetup setup;
-        setup.params.contact.method = method;
-        setup.params.effects.vibration = false;
-        setup.device = SpringHand::traits();
-        HapticRenderer renderer(setup, bone, {}, 1 / hz);
-        SpringHand hand;
-        double removed = 0;
-        Vec3 force{};
-        for (int t = 0; t < static_cast<int>(2 * hz); ++t) {
-          HandGoal goal;
-          const double s = t / hz;
-          goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
-          goal.axis = {0.6F, 0, 0.8F};
-          goal.drill_on = 1;
-          goal.tool = static_cast<std::uint8_t>(tool);
-          const auto step = renderer.step(bone, hand.step(goal, 1 / hz, force));
-          force = {step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
-          removed += static_cast<double>(step.record.removed_mm3);
-        }
-        return removed;
-      };
+      const auto drill = [&](double h, double hz) { return test::drilled_mm3(method, h, hz, tool); };
       const double reference = drill(0.5, 1000);
       std::printf("| %s | %s | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.1f |\n", name_of(method),
                   burr_library()[static_cast<std::size_t>(tool)].name().c_str(), drill(0.25, 1000) / reference,

@@ -6,6 +6,7 @@
 #include "osteo/base/error.h"
 #include "osteo/bone/structure_map.h"
 #include "osteo/bone/thickness.h"
+#include "solid.h"
 
 namespace osteo {
 namespace {
@@ -66,28 +67,7 @@ TEST(StructureMap, WithoutStructuresIsAnError) {
 }
 
 BrickGrid shell(double h, double inner, double outer) {
-  Frame f;
-  const int n = static_cast<int>(std::ceil(2 * (outer + 2) / h / 8)) * 8;
-  f.dims = {n, n, n};
-  f.spacing_mm = {h, h, h};
-  const double lo = -n * h / 2 + h / 2;
-  f.origin_mm = {lo, lo, lo};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        int in = 0;
-        for (int s = 0; s < 64; ++s) {
-          const double r = length(f.world_from_index({i + ((s & 3) - 1.5) / 4, j + ((s >> 2 & 3) - 1.5) / 4, k + ((s >> 4) - 1.5) / 4}));
-          in += r > inner && r < outer ? 1 : 0;
-        }
-        g.set(g.find(i, j, k), static_cast<float>(in) / 64);
-      }
-  return g;
+  return test::solid(h, outer + 2, [=](Vec3 p) { return length(p) > inner && length(p) < outer; });
 }
 
 TEST(Thickness, OfSphericalShells) {

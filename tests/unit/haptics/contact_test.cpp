@@ -10,6 +10,7 @@
 #include "osteo/haptics/servo.h"
 #include "overlap_kernel.h"
 #include "slab.h"
+#include "solid.h"
 
 namespace osteo {
 namespace {
@@ -25,29 +26,10 @@ DeviceSample at(double x, double y, double z, int tool = 3) {
   return s;
 }
 
-// A body given by what is inside, its voxels filled by 8^3 samples each.
+// Voxels filled by 8^3 samples each.
 template <class Inside>
 BrickGrid body(double h, double half_mm, Inside inside) {
-  Frame f;
-  const int n = static_cast<int>(std::ceil(2 * half_mm / h / 8)) * 8;
-  f.dims = {n, n, n};
-  f.spacing_mm = {h, h, h};
-  f.origin_mm = {-n * h / 2 + h / 2, -n * h / 2 + h / 2, -n * h / 2 + h / 2};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const Vec3 c = f.world_from_index({double(i), double(j), double(k)});
-        int in = 0;
-        for (int s = 0; s < 512; ++s)
-          in += inside(c + Vec3{((s & 7) - 3.5) / 8 * h, ((s >> 3 & 7) - 3.5) / 8 * h, ((s >> 6) - 3.5) / 8 * h}) ? 1 : 0;
-        g.set(g.find(i, j, k), static_cast<float>(in) / 512);
-      }
-  return g;
+  return test::solid(h, half_mm, inside, {}, 8);
 }
 
 const ContactMethod kMethods[] = {ContactMethod::rays, ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy};
@@ -377,37 +359,13 @@ TEST(Removal, WhatIsTakenIsWhatIsMissing) {
 }
 
 // The rate is a property of the burr, not of voxels or ticks: a hand of constant force drills the same volume.
-double drill(ContactMethod method, double h, double rate_hz, int tool = 3) {
-  auto bone = slab(h);
-  HapticSetup setup;
-  setup.params.contact.method = method;
-  setup.params.effects.vibration = false;
-  setup.device = SpringHand::traits();
-  HapticRenderer renderer(setup, bone, {}, 1 / rate_hz);
-  SpringHand hand;
-  double removed = 0;
-  Vec3 force{};
-  for (int t = 0; t < static_cast<int>(2 * rate_hz); ++t) {
-    HandGoal goal;
-    const double s = t / rate_hz;
-    goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
-    goal.axis = {0.6F, 0, 0.8F};
-    goal.drill_on = 1;
-    goal.tool = static_cast<std::uint8_t>(tool);
-    const auto [record, changes] = renderer.step(bone, hand.step(goal, 1 / rate_hz, force));
-    force = {record.force_n[0], record.force_n[1], record.force_n[2]};
-    removed += static_cast<double>(record.removed_mm3);
-  }
-  return removed;
-}
-
 TEST(Removal, SameVolumeForAnyVoxelAndTick) {
   for (const ContactMethod method : {ContactMethod::volume, ContactMethod::overlap, ContactMethod::proxy}) {
     SCOPED_TRACE(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]);
-    const double reference = drill(method, 0.5, 1000);
+    const double reference = test::drilled_mm3(method, 0.5, 1000);
     EXPECT_GT(reference, 4);
     for (const auto& [h, hz] : {std::pair{0.25, 1000.0}, {1.0, 1000.0}, {0.5, 500.0}, {0.5, 5000.0}, {0.35, 2000.0}}) {
-      EXPECT_NEAR(drill(method, h, hz) / reference, 1, 0.05) << h << " mm, " << hz << " Hz";
+      EXPECT_NEAR(test::drilled_mm3(method, h, hz) / reference, 1, 0.05) << h << " mm, " << hz << " Hz";
     }
   }
 }

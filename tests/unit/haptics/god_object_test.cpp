@@ -93,7 +93,7 @@ TEST(GodObject, WorksFarFromTheOrigin) {
 }
 
 // Fields with an answer in closed form.
-struct Walls {  // intersection of half spaces: free where all are kept
+struct Walls {                                  // intersection of half spaces: free where all are kept
   std::vector<std::pair<Vec3, double>> planes;  // normal, offset: free where dot(n, x) >= offset
   double radius = 0;
   Clearance operator()(Vec3 x) const {
@@ -137,7 +137,7 @@ TEST(GodObject, DoesNotPassAThinShellEitherWay) {
   for (const double from : {15.0, 0.0}) {
     GodObject proxy;
     proxy.place({0, 0.01, from});
-    for (double z = from; from > 5 ? z > -3 : z < 14; z += from > 5 ? -0.1 : 0.1) {
+    for (double z = from; from > 5 ? z > -3 : z<14; z += from> 5 ? -0.1 : 0.1) {
       const auto a = proxy.update(shell, {0, 0.01, z}, {.feature_mm = 0.5, .tolerance_mm = 1e-6});
       EXPECT_TRUE(from > 5 ? length(a.proxy_mm) >= 10 - 1e-4 : length(a.proxy_mm) <= 9.9 + 1e-4) << z;
     }

@@ -7,6 +7,7 @@
 
 #include "osteo/haptics/renderer.h"
 #include "slab.h"
+#include "solid.h"
 #include "stability.h"
 
 namespace osteo {
@@ -74,33 +75,6 @@ struct Checked {
   }
 };
 
-template <class Inside>
-BrickGrid solid(double h, double half_mm, Vec3 origin, Inside inside) {
-  Frame f;
-  const int n = static_cast<int>(std::ceil(2 * half_mm / h / 8)) * 8;
-  f.dims = {n, n, n};
-  f.spacing_mm = {h, h, h};
-  const double lo = -n * h / 2 + h / 2;
-  f.origin_mm = origin + Vec3{lo, lo, lo};
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        int in = 0;
-        for (int s = 0; s < 64; ++s)
-          in +=
-              inside(Vec3{lo + (i + ((s & 3) - 1.5) / 4) * h, lo + (j + ((s >> 2 & 3) - 1.5) / 4) * h, lo + (k + ((s >> 4) - 1.5) / 4) * h})
-                  ? 1
-                  : 0;
-        g.set(g.find(i, j, k), static_cast<float>(in) / 64);
-      }
-  return g;
-}
-
 struct HardCase {
   const char* name;
   bool (*inside)(Vec3);
@@ -134,7 +108,7 @@ class HardCases : public testing::TestWithParam<std::tuple<ContactMethod, HardCa
 
 TEST_P(HardCases, StayWithinAllBounds) {
   const auto& [method, c] = GetParam();
-  const auto bone0 = solid(0.5, 12, {c.origin, c.origin, c.origin}, c.inside);
+  const auto bone0 = test::solid(0.5, 12, c.inside, {c.origin, c.origin, c.origin});
   std::vector<TickRecord> first;
   for (int round = 0; round < 2; ++round) {
     auto bone = bone0;
@@ -177,7 +151,7 @@ DeviceSample at(double x, double y, double z) {
 
 TEST(HardCase, StartedInsideTheForceLeadsOut) {
   for (const ContactMethod method : {ContactMethod::volume, ContactMethod::overlap}) {
-    auto bone = solid(0.5, 12, {}, [](Vec3 p) { return length(p) < 9; });
+    auto bone = test::solid(0.5, 12, [](Vec3 p) { return length(p) < 9; });
     Checked run(setup_for(method), bone);
     for (int t = 0; t < 300; ++t) static_cast<void>(run.step(bone, at(3, 1, 0)));
     EXPECT_GT(dot(run.last_force, normalized({3, 1, 0})), 0.8 * length(run.last_force));
@@ -305,7 +279,7 @@ TEST(Guard, StiffnessFollowsTickDelayAndDamping) {
 // Anything a device may say, for a hundred thousand ticks; osteo bench haptics does a hundred million.
 TEST(Fuzz, NoForceIsEverOutOfBounds) {
   for (const ContactMethod method : kMethods) {
-    auto bone = solid(0.5, 12, {}, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
+    auto bone = test::solid(0.5, 12, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
     Checked run(setup_for(method), bone);
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> u(-1, 1);
