@@ -56,7 +56,7 @@ _osteo() {
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
     scene) flags="$flags --settings --contact" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --pieces --resume" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --pieces --dust --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     devices) flags="$flags --watch --recording" ;;

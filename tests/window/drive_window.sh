@@ -18,7 +18,7 @@ trap 'kill $xvfb 2>/dev/null || true' EXIT
 export DISPLAY=:$display
 for _ in $(seq 100); do xdotool getdisplaygeometry >/dev/null 2>&1 && break; sleep 0.1; done
 
-"$bin/osteo" rehearse case --diameter-mm 6 -o session >window.log 2>&1 &
+"$bin/osteo" rehearse case --diameter-mm 6 --dust -o session >window.log 2>&1 &
 app=$!
 id=
 for _ in $(seq 200); do
@@ -42,6 +42,7 @@ for step in $(seq 8); do
   sleep 0.4
 done
 xdotool mouseup 1; sleep 0.4
+xdotool keydown v; sleep 0.4; xdotool keyup v
 # Turn the view with the right button, then a screenshot.
 xdotool mousedown 3; sleep 0.3; xdotool mousemove_relative -- 30 12; sleep 0.4; xdotool mouseup 3; sleep 0.4
 xdotool key s; sleep 1.5

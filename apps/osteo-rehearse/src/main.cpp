@@ -85,6 +85,7 @@ struct WindowCommand {
     std::string settings;
     Hand device = Hand::automatic;
     std::string arm;
+    bool dust = false;
     double rate_hz = 1000;
     std::string resume;
     int width = 1360;
@@ -99,6 +100,7 @@ struct WindowCommand {
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"device", "what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
     visit({"arm", "geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
+    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off (V)"}, p.dust);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit({"width", "of the window", "pixels", 640, 8192}, p.width);
@@ -124,6 +126,7 @@ struct WindowCommand {
     RehearsalOptions options;
     options.rate_hz = p.rate_hz;
     options.follow_pieces = true;
+    options.dust = p.dust;
     const Hands hands(p.device, p.arm);
     options.haptics.params.contact.method = p.contact;
     apply_haptic_settings(the_case.folder, p.settings, options.haptics);

@@ -173,6 +173,7 @@ struct RehearseCommand {
     double rate_hz = 1000;
     bool fast = false;
     bool pieces = false;
+    bool dust = false;
     std::string resume;
   };
   static void describe(Params& p, auto& visit) {
@@ -191,6 +192,7 @@ struct RehearseCommand {
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
     visit({"pieces", "watch whether the bone still hangs together; the summary lists the pieces (the window always does)"}, p.pieces);
+    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
     visit({"resume", "go on from the end of this session"}, p.resume);
   }
   static cli::CommandInfo info();

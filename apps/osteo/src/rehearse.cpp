@@ -40,6 +40,7 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
                                 "--contact",      std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(p.contact)]),
                                 "--rate-hz",      format_number(p.rate_hz)};
   if (!p.settings.empty()) args.insert(args.end(), {"--settings", p.settings});
+  if (p.dust) args.emplace_back("--dust");
   if (!p.device.empty()) args.insert(args.end(), {"--device", p.device});
   if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
   if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
@@ -95,6 +96,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.rate_hz = p.rate_hz;
   options.session_file = session.stream();
   options.follow_pieces = p.pieces;
+  options.dust = p.dust;
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
   options.haptics.device = device->traits();
   options.haptics.params.contact.method = p.contact;

@@ -42,7 +42,7 @@ StageInfo SawStage::info() {
           "cut goes all through. What falls apart is told by 'pieces'.",
       .inputs = {{"bone", {DataKind::grid}, "density, as resample makes it"}},
       .outputs = {{"cut", {DataKind::grid}, "the same with the cut"}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.7"},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.5"},
       .example = "osteo saw bone.vdb cut.vdb --normal 1,0,0 --kerf-mm 0.8"};
 }
 

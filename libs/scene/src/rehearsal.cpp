@@ -31,7 +31,11 @@ Rehearsal::Rehearsal(BrickGrid bone, std::unique_ptr<Device> device, const Rehea
     components_ = std::make_unique<LiveComponents>(bone_);
     pieces_ = static_cast<int>(large_pieces().size());
   }
-  if (options_.follow_surface || options_.follow_pieces) surface_reader_ = &stream_.add_reader();
+  if (options_.dust) {
+    dust_bone_ = BrickGrid(bone_);
+    dust_ = std::make_unique<Dust>(dust_bone_);
+  }
+  if (options_.follow_surface || options_.follow_pieces || options_.dust) surface_reader_ = &stream_.add_reader();
   if (options_.follow_surface) {
     surface_ = std::make_unique<LiveSurface>(bone_, context);
   }
@@ -49,6 +53,29 @@ double Rehearsal::removed_mm3() const {
 }
 bool Rehearsal::running() const {
   return loop_ && loop_->running();
+}
+
+void Rehearsal::dust_tick(const TickRecord& tick, std::span<const VoxelChange> changes) {
+  for (const VoxelChange& c : changes) {
+    const double gone = static_cast<double>(dust_bone_.value(c.voxel) - c.density) * dust_bone_.frame().voxel_volume_mm3();
+    dust_bone_.set(c.voxel, c.density);
+    dust_->add(c.voxel, gone);
+  }
+  // A hundred steps a second: 50 mm/s at half-millimetre voxels.
+  const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(options_.rate_hz / 100)));
+  if (tick.tick % every != 0) return;
+  const auto vec = [](const std::array<float, 3>& f) {
+    return Vec3{static_cast<double>(f[0]), static_cast<double>(f[1]), static_cast<double>(f[2])};
+  };
+  if (tick.device.tool < burr_library().size())
+    dust_->push(burr_library()[tick.device.tool].head(), vec(tick.device.position_mm) + vec(tick.shown_offset_mm),
+                normalized(vec(tick.device.axis)));
+  dust_->step();
+}
+
+void Rehearsal::with_dust(const std::function<void(Dust&)>& f) {
+  const std::lock_guard lock(surface_mutex_);
+  if (dust_) f(*dust_);
 }
 
 std::vector<LiveComponents::Component> Rehearsal::large_pieces() {
@@ -81,6 +108,12 @@ std::size_t Rehearsal::drain_surface() {
     }
     if (wanted > change_buffer_.size()) change_buffer_.resize(wanted);
     const std::size_t got = surface_reader_->changes.pop({change_buffer_.data(), wanted});
+    std::size_t used = 0;
+    for (std::size_t t = 0; t < n && dust_; ++t) {
+      const std::size_t changed = std::min<std::size_t>(tick_buffer_[t].voxels_changed, got - used);
+      dust_tick(tick_buffer_[t], {change_buffer_.data() + used, changed});
+      used += changed;
+    }
     for (std::size_t c = 0; c < got; ++c) {
       if (surface_) surface_->mark(change_buffer_[c].voxel);
       if (components_) components_->mark(change_buffer_[c].voxel);
@@ -142,6 +175,7 @@ RehearsalSummary Rehearsal::finish() {
   }
   if (surface_reader_ != nullptr) s.dropped = surface_reader_->dropped;
   if (components_) s.pieces = large_pieces();
+  if (dust_) s.dust = dust_->totals();
   if (recorder_) {
     if (recorder_->failure()) throw Error(*recorder_->failure());
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3});

@@ -131,6 +131,13 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
           {{"volume_mm3", p.mass * bone.frame().voxel_volume_mm3()}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
     }
   }
+  if (s.dust) {
+    j["dust_mm3"] = {{"made", s.dust->added_mm3},
+                     {"lying", s.dust->present_mm3},
+                     {"sucked_off", s.dust->sucked_mm3},
+                     {"washed_away", s.dust->washed_mm3},
+                     {"fallen_out_of_reach", s.dust->fallen_mm3}};
+  }
   if (anatomy.structures) {
     // Seconds, not ticks: for people. What was never within reach is not listed.
     j["structures"] = ordered_json::array();

@@ -26,10 +26,12 @@
 #include <optional>
 
 #include "cuts_panel.h"
+#include "gamepad.h"
 #include "osteo/base/error.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/bone_view.h"
+#include "osteo/view/dust_view.h"
 #include "osteo/view/offscreen.h"
 #include "status_panel.h"
 
@@ -55,6 +57,7 @@ class RehearsalWindow {
     glfwMakeContextCurrent(window_);
     cuts_.release();
     bone_view_.reset();
+    dust_view_.reset();
     render_window_->Finalize();
     ImGui_ImplOpenGL3_Shutdown();
     ImGui_ImplGlfw_Shutdown();
@@ -261,6 +264,7 @@ class RehearsalWindow {
         [&](const LiveSurface& surface, std::span<const std::uint32_t> changed) { bone_view_->update(surface, changed); });
     const TickRecord tick = rehearsal.latest();
     place_tool(tick);
+    dust(rehearsal, tick);
 
     render_window_->SetSize(width_, height_);
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
@@ -277,6 +281,20 @@ class RehearsalWindow {
     if (screenshot_wanted_) save_screenshot();
     for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
     glfwSwapBuffers(window_);
+  }
+
+  // The dust as it lies; V sucks it off at the burr.
+  void dust(Rehearsal& rehearsal, const TickRecord& tick) {
+    rehearsal.with_dust([&](Dust& d) {
+      if (ImGui::IsKeyDown(ImGuiKey_V)) {
+        const auto& x = tick.device.position_mm;
+        constexpr double kNozzleMm = 4, kMm3PerS = 60;
+        d.suck({static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])}, kNozzleMm,
+               kMm3PerS * static_cast<double>(ImGui::GetIO().DeltaTime));
+      }
+      if (!dust_view_) dust_view_ = std::make_unique<DustView>(renderer_, rehearsal.bone().frame().spacing_mm.x);
+      dust_view_->update(d);
+    });
   }
 
   void place_tool(const TickRecord& tick) {
@@ -338,22 +356,14 @@ class RehearsalWindow {
     send_goal();
   }
 
-  // Left stick across the view, right stick deeper and back, right trigger drills.
   void gamepad(double seconds) {
-    GLFWgamepadstate pad;
-    if (glfwGetGamepadState(GLFW_JOYSTICK_1, &pad) == GLFW_FALSE) return;
-    constexpr double kMmPerS = 40, kDeadZone = 0.12;
-    const auto axis = [&](int a) {
-      const double v = static_cast<double>(pad.axes[a]);
-      return std::abs(v) < kDeadZone ? 0.0 : v * std::abs(v);
-    };
+    const auto pad = read_gamepad();
+    if (!pad) return;
     double up[3];
     renderer_->GetActiveCamera()->GetViewUp(up);
     const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
-    const Vec3 move =
-        right * axis(GLFW_GAMEPAD_AXIS_LEFT_X) - above * axis(GLFW_GAMEPAD_AXIS_LEFT_Y) - forward * axis(GLFW_GAMEPAD_AXIS_RIGHT_Y);
-    goal_.position_mm += move * (kMmPerS * std::min(seconds, 0.1));
-    drill_held_ = drill_held_ || pad.axes[GLFW_GAMEPAD_AXIS_RIGHT_TRIGGER] > 0;
+    goal_.position_mm += (right * pad->right_mm_s + above * pad->up_mm_s + forward * pad->deeper_mm_s) * std::min(seconds, 0.1);
+    drill_held_ = drill_held_ || pad->drill;
   }
 
   struct KeyPress {
@@ -540,6 +550,7 @@ class RehearsalWindow {
                                                {"Ctrl-wheel", "nearer and farther"},
                                                {"1 to 7, C, D", "burr: diameter, cutting, diamond"},
                                                {"B, Y, T", "ball, cylinder, taper"},
+                                               {"V", "sucks dust off at the burr"},
                                                {"S", "screenshot into the session's folder"},
                                                {"F5", "save the session and go on"},
                                                {"R", "save the session, the bone is whole again"},
@@ -563,6 +574,7 @@ class RehearsalWindow {
   vtkNew<vtkActor> burr_, shaft_;
   vtkNew<vtkMatrix4x4> tool_matrix_;
   std::unique_ptr<BoneView> bone_view_;
+  std::unique_ptr<DustView> dust_view_;
   CutsPanel cuts_;
   Vec3 centre_{};
   double radius_ = 100;

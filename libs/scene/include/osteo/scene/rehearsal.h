@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "osteo/bone/dust.h"
 #include "osteo/bone/live_components.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/haptics/servo.h"
@@ -22,6 +23,7 @@ struct RehearsalOptions {
   Anatomy anatomy;  ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
   bool follow_surface = true;
+  bool dust = false;           ///< bone dust: falls, piles, is pushed by the burr, can be sucked off
   bool follow_pieces = false;  ///< watch whether the bone still hangs together
 };
 
@@ -37,6 +39,7 @@ struct RehearsalSummary {
     std::uint64_t ticks_touched = 0, ticks_injured = 0;
   };
   std::map<std::uint32_t, StructureEvents> structures;
+  std::optional<Dust::Totals> dust;  ///< where the scene has dust
   std::vector<LiveComponents::Component> pieces;  ///< of at least kLeastPieceMm3, largest first; empty unless they were followed
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
 };
@@ -74,8 +77,12 @@ class Rehearsal {
   /// Calls f(surface, bricks changed since the last call) under the lock that keeps the follower away.
   void with_surface(const std::function<void(const LiveSurface&, std::span<const std::uint32_t>)>& f);
 
+  /// Calls f(dust) under the lock that keeps the follower away; not at all where the scene has none.
+  void with_dust(const std::function<void(Dust&)>& f);
+
  private:
   void follow();
+  void dust_tick(const TickRecord& tick, std::span<const VoxelChange> changes);
   std::size_t drain_surface();
   std::vector<LiveComponents::Component> large_pieces();
   RehearsalSummary finish();
@@ -96,6 +103,8 @@ class Rehearsal {
   std::unique_ptr<LiveSurface> surface_;
   std::unique_ptr<LiveComponents> components_;
   std::atomic<int> pieces_{0};
+  BrickGrid dust_bone_;  // as of the tick that the dust has reached, so that it does not depend on how far the servo is
+  std::unique_ptr<Dust> dust_;
   std::set<std::uint32_t> changed_bricks_;
   std::vector<TickRecord> tick_buffer_;
   std::vector<VoxelChange> change_buffer_;

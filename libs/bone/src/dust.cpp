@@ -1,0 +1,252 @@
+#include "osteo/bone/dust.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace osteo {
+namespace {
+
+Ijk stepped(Ijk c, int axis, int by) {
+  (axis == 0 ? c.i : axis == 1 ? c.j : c.k) += by;
+  return c;
+}
+
+}  // namespace
+
+Dust::Dust(const BrickGrid& bone, const DustParams& params)
+    : bone_(bone), capacity_(static_cast<std::uint32_t>(std::clamp(params.packing, 0.01, 1.0) * kUnitsAVoxel)) {
+  const Vec3 g = transposed(bone.frame().direction) * params.gravity;
+  for (int a = 0; a < 3; ++a) {
+    if (std::abs(g[static_cast<std::size_t>(a)]) > std::abs(g[static_cast<std::size_t>(axis_)])) axis_ = a;
+  }
+  sign_ = g[static_cast<std::size_t>(axis_)] < 0 ? -1 : 1;
+}
+
+bool Dust::in_reach(Ijk c) const {
+  const auto& n = bone_.frame().dims;
+  const int r = kReach * 8;
+  return c.i >= -r && c.j >= -r && c.k >= -r && c.i < n[0] + r && c.j < n[1] + r && c.k < n[2] + r;
+}
+
+std::uint32_t* Dust::cell(Ijk c, bool make) {
+  const std::uint64_t k = key(c.i >> 3, c.j >> 3, c.k >> 3);
+  auto found = index_.find(k);
+  if (found == index_.end()) {
+    if (!make) return nullptr;
+    found = index_.emplace(k, static_cast<std::uint32_t>(bricks_.size())).first;
+    bricks_.push_back(std::make_unique<Brick>());
+    bricks_.back()->at = {c.i >> 3, c.j >> 3, c.k >> 3};
+  }
+  return &bricks_[found->second]->units[BrickGrid::offset_in_brick(c.i, c.j, c.k)];
+}
+
+// The brick of a cell and those beside it, as far as the cell touches them: what happened here may set them moving.
+void Dust::wake(Ijk c) {
+  for (int k = (c.k - 1) >> 3; k <= (c.k + 1) >> 3; ++k)
+    for (int j = (c.j - 1) >> 3; j <= (c.j + 1) >> 3; ++j)
+      for (int i = (c.i - 1) >> 3; i <= (c.i + 1) >> 3; ++i) {
+        const auto found = index_.find(key(i, j, k));
+        if (found == index_.end() || bricks_[found->second]->awake) continue;
+        bricks_[found->second]->awake = true;
+        next_.push_back(found->second);
+      }
+}
+
+void Dust::add(VoxelKey voxel, double mm3) {
+  const double units = mm3 / bone_.frame().voxel_volume_mm3() * kUnitsAVoxel + carry_;
+  const auto whole = static_cast<std::uint32_t>(std::clamp(units, 0.0, 4e9));
+  carry_ = units - whole;
+  if (whole == 0) return;
+  const Ijk c = bone_.coordinate(voxel);
+  *cell(c, true) += whole;
+  added_ += whole;
+  wake(c);
+}
+
+// As much as fits, up to `most`. Returns what went.
+std::uint32_t Dust::move(std::uint32_t& from, Ijk to, std::uint32_t most) {
+  if (most == 0 || solid(to)) return 0;
+  if (!in_reach(to)) {
+    from -= most;
+    fallen_ += most;
+    return most;
+  }
+  const std::uint32_t* const there = cell(to, false);
+  const std::uint32_t held = there != nullptr ? *there : 0;
+  if (held >= capacity_) return 0;
+  const std::uint32_t amount = std::min(most, capacity_ - held);
+  *cell(to, true) += amount;  // may make a brick; `from` stays, since bricks do not move
+  from -= amount;
+  return amount;
+}
+
+void Dust::step() {
+  // Lowest first, so that what falls does not fall on in the same step, and a column falls as one.
+  awake_.swap(next_);
+  next_.clear();
+  const auto height = [&](const Brick& b) { return sign_ * (axis_ == 0 ? b.at.i : axis_ == 1 ? b.at.j : b.at.k); };
+  std::sort(awake_.begin(), awake_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const Brick &x = *bricks_[a], &y = *bricks_[b];
+    if (height(x) != height(y)) return height(x) > height(y);
+    return key(x.at.i, x.at.j, x.at.k) < key(y.at.i, y.at.j, y.at.k);
+  });
+  for (const std::uint32_t b : awake_) bricks_[b]->awake = false;
+  const int side_axis[2] = {(axis_ + 1) % 3, (axis_ + 2) % 3};
+  ++steps_;
+  for (const std::uint32_t b : awake_) {
+    Brick* const brick = bricks_[b].get();
+    for (int layer = 0; layer < 8; ++layer) {
+      const int along = sign_ > 0 ? 7 - layer : layer;
+      for (int n = 0; n < 64; ++n) {
+        // The other way round every other step, so that piles do not lean.
+        const int place = steps_ % 2 == 0 ? n : 63 - n;
+        int at[3];
+        at[axis_] = along;
+        at[side_axis[0]] = place & 7;
+        at[side_axis[1]] = place >> 3;
+        std::uint32_t& units = brick->units[static_cast<std::size_t>(at[0] | at[1] << 3 | at[2] << 6)];
+        if (units == 0) continue;
+        const Ijk c{brick->at.i * 8 + at[0], brick->at.j * 8 + at[1], brick->at.k * 8 + at[2]};
+        const std::uint32_t before = units;
+        move(units, stepped(c, axis_, sign_), units);
+        if (units > 0) {
+          // Down a slope: sideways and down at once, where both are free.
+          for (int s = 0; s < 4 && units > 0; ++s) {
+            const int turn = (s + static_cast<int>(steps_)) % 4;
+            const Ijk beside = stepped(c, side_axis[turn / 2], turn % 2 == 0 ? 1 : -1);
+            if (solid(beside)) continue;
+            move(units, stepped(beside, axis_, sign_), (units + 3 - static_cast<std::uint32_t>(s)) / (4 - static_cast<std::uint32_t>(s)));
+          }
+        }
+        if (units > capacity_ || (units > 0 && solid(c))) {
+          // Too full, or bone stands here (it was cut into by less than half): to the sides, then up.
+          std::uint32_t excess = solid(c) ? units : units - capacity_;
+          for (int s = 0; s < 4 && excess > 0; ++s) {
+            const int turn = (s + static_cast<int>(steps_)) % 4;
+            excess -= move(units, stepped(c, side_axis[turn / 2], turn % 2 == 0 ? 1 : -1),
+                           (excess + 3 - static_cast<std::uint32_t>(s)) / (4 - static_cast<std::uint32_t>(s)));
+          }
+          if (excess > 0) move(units, stepped(c, axis_, -sign_), excess);
+        }
+        if (units != before) {
+          wake(c);
+          wake(stepped(c, axis_, 2 * sign_));
+        }
+      }
+    }
+  }
+}
+
+template <class F>
+void Dust::in_ball(Vec3 centre_mm, double radius_mm, F&& f) {
+  const Frame& frame = bone_.frame();
+  const Vec3 x = frame.index_from_world(centre_mm);
+  const double r = radius_mm / frame.spacing_mm.x;
+  if (!(std::abs(x.x) < 1e5 && std::abs(x.y) < 1e5 && std::abs(x.z) < 1e5) || !(r > 0 && r < 1e4)) return;
+  for (int k = static_cast<int>(std::floor(x.z - r)); k <= x.z + r; ++k)
+    for (int j = static_cast<int>(std::floor(x.y - r)); j <= x.y + r; ++j)
+      for (int i = static_cast<int>(std::floor(x.x - r)); i <= x.x + r; ++i) {
+        const Vec3 d = Vec3{double(i), double(j), double(k)} - x;
+        if (dot(d, d) > r * r) continue;
+        if (std::uint32_t* const units = cell({i, j, k}, false); units != nullptr && *units > 0) f(Ijk{i, j, k}, *units, d);
+      }
+}
+
+void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {
+  const Frame& frame = bone_.frame();
+  const Vec3 middle = start_mm + axis * (tool.start_mm + tool.length_mm / 2);
+  const double reach = tool.length_mm / 2 + tool.largest_radius_mm();
+  in_ball(middle, reach, [&](Ijk c, std::uint32_t& units, Vec3) {
+    const Vec3 p = frame.world_from_index({double(c.i), double(c.j), double(c.k)}) - start_mm - axis * tool.start_mm;
+    const double t = dot(p, axis), foot = tool.foot_mm(length(p - axis * t), t);
+    const Vec3 out = p - axis * foot;
+    const double inside = tool.radius_at_mm(foot) - length(out);
+    if (inside <= 0) return;
+    // To the first cell beyond the surface along the normal, and on until there is room.
+    const Vec3 n = transposed(frame.direction) * (length(out) > 1e-6 ? normalized(out) : any_perpendicular(axis));
+    const double far = inside / frame.spacing_mm.x;
+    for (int s = 1; s <= 4 && units > 0; ++s) {
+      const Ijk to{static_cast<int>(std::lround(c.i + n.x * (far + s))), static_cast<int>(std::lround(c.j + n.y * (far + s))),
+                   static_cast<int>(std::lround(c.k + n.z * (far + s)))};
+      if (to == c) continue;
+      if (move(units, to, units) > 0) wake(to);
+    }
+    // No room: heaped up beyond what a cell holds, outside the tool along the normal, or where bone is there upwards out of it; it spreads
+    // with the next steps.
+    for (int s = 1; s <= 64 && units > 0; ++s) {
+      const Ijk aside{static_cast<int>(std::lround(c.i + n.x * (far + s))), static_cast<int>(std::lround(c.j + n.y * (far + s))),
+                      static_cast<int>(std::lround(c.k + n.z * (far + s)))};
+      const Ijk to = s == 1 ? aside : stepped(c, axis_, -sign_ * s);
+      if (to == c || solid(to) || !in_reach(to)) continue;
+      const Vec3 q = frame.world_from_index({double(to.i), double(to.j), double(to.k)}) - start_mm - axis * tool.start_mm;
+      const double along = dot(q, axis), off = length(q - axis * along), its_foot = tool.foot_mm(off, along);
+      if (std::hypot(off, along - its_foot) < tool.radius_at_mm(its_foot)) continue;
+      *cell(to, true) += units;
+      units = 0;
+      wake(to);
+    }
+    wake(c);
+  });
+}
+
+double Dust::suck(Vec3 nozzle_mm, double radius_mm, double mm3) {
+  const double voxel = bone_.frame().voxel_volume_mm3();
+  auto wanted = static_cast<std::uint64_t>(std::max(0.0, mm3 / voxel * kUnitsAVoxel));
+  struct Near {
+    double distance2;
+    Ijk at;
+    std::uint32_t* units;
+  };
+  std::vector<Near> near;
+  in_ball(nozzle_mm, radius_mm, [&](Ijk c, std::uint32_t& units, Vec3 d) { near.push_back({dot(d, d), c, &units}); });
+  std::stable_sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return a.distance2 < b.distance2; });
+  std::uint64_t taken = 0;
+  for (const Near& n : near) {
+    if (wanted == 0) break;
+    const auto amount = static_cast<std::uint32_t>(std::min<std::uint64_t>(*n.units, wanted));
+    *n.units -= amount;
+    wanted -= amount;
+    taken += amount;
+    wake(n.at);
+  }
+  sucked_ += taken;
+  return static_cast<double>(taken) / kUnitsAVoxel * voxel;
+}
+
+double Dust::irrigate(Vec3 at_mm, double radius_mm, double share) {
+  std::uint64_t taken = 0;
+  in_ball(at_mm, radius_mm, [&](Ijk c, std::uint32_t& units, Vec3) {
+    const auto amount = static_cast<std::uint32_t>(static_cast<double>(units) * std::clamp(share, 0.0, 1.0) + 0.5);
+    units -= amount;
+    taken += amount;
+    wake(c);
+  });
+  washed_ += taken;
+  return static_cast<double>(taken) / kUnitsAVoxel * bone_.frame().voxel_volume_mm3();
+}
+
+Dust::Totals Dust::totals() const {
+  const double unit = bone_.frame().voxel_volume_mm3() / kUnitsAVoxel;
+  std::uint64_t present = 0;
+  for (const auto& b : bricks_)
+    for (const std::uint32_t u : b->units) present += u;
+  return {static_cast<double>(added_) * unit, static_cast<double>(present) * unit, static_cast<double>(sucked_) * unit,
+          static_cast<double>(washed_) * unit, static_cast<double>(fallen_) * unit};
+}
+
+void Dust::visit(const std::function<void(Vec3, double)>& f) const {
+  std::vector<const Brick*> order;
+  for (const auto& b : bricks_) order.push_back(b.get());
+  std::sort(order.begin(), order.end(),
+            [](const Brick* a, const Brick* b) { return key(a->at.i, a->at.j, a->at.k) < key(b->at.i, b->at.j, b->at.k); });
+  for (const Brick* b : order) {
+    for (int v = 0; v < 512; ++v) {
+      const std::uint32_t u = b->units[static_cast<std::size_t>(v)];
+      if (u == 0) continue;
+      f(bone_.frame().world_from_index({double(b->at.i * 8 + (v & 7)), double(b->at.j * 8 + (v >> 3 & 7)), double(b->at.k * 8 + (v >> 6))}),
+        static_cast<double>(u) / capacity_);
+    }
+  }
+}
+
+}  // namespace osteo
