@@ -19,6 +19,7 @@
 
 #include "ball.h"
 #include "bench.h"
+#include "osteo/bone/dust.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/bone/pieces.h"
 #include "osteo/bone/saw.h"
@@ -325,6 +326,46 @@ void bench_pieces(const Context& context) {
   std::printf("\n");
 }
 
+// Dust falling into a bowl of 80 mm: what a cell that may move costs.
+void bench_dust() {
+  Frame f;
+  f.dims = {192, 192, 192};
+  f.spacing_mm = {0.5, 0.5, 0.5};
+  std::vector<Ijk> bricks;
+  for (int b = 0; b < 24 * 24 * 24; ++b) bricks.push_back({b % 24, b / 24 % 24, b / 576});
+  BrickGrid bone(f, bricks);
+  for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
+    const Ijk c = bone.coordinate(v);
+    bone.set(v, length(Vec3{c.i - 96.0, c.j - 80.0, c.k - 96.0}) > 84 ? 1.0F : 0.0F);
+  }
+  Dust dust(bone);
+  std::mt19937 random(6);
+  std::printf(
+      "## Dust: cells of 0.5 mm in a bowl\n\n| cells that hold dust | awake cells (of awake bricks) | ms a step | ns an awake cell | made "
+      "less all there is, mm3 "
+      "|\n|---|---|---|---|---|\n");
+  for (const int wanted : {20000, 100000, 400000, 1000000}) {
+    std::size_t holding = 0;
+    while (true) {
+      for (int n = 0; n < wanted / 8; ++n)
+        dust.add(
+            bone.find(60 + static_cast<int>(random() % 72), 20 + static_cast<int>(random() % 60), 60 + static_cast<int>(random() % 72)),
+            0.02);
+      for (int s = 0; s < 5; ++s) dust.step();
+      holding = 0;
+      dust.visit([&](Vec3, double) { ++holding; });
+      if (holding >= static_cast<std::size_t>(wanted) || dust.totals().present_mm3 > 60000) break;
+    }
+    const std::size_t awake = dust.awake_bricks() * 512;
+    const double s = seconds([&] { dust.step(); }, 3);
+    const auto t = dust.totals();
+    std::printf("| %zu | %zu | %.2f | %.1f | %.2g |\n", holding, awake, 1000 * s,
+                1e9 * s / static_cast<double>(std::max<std::size_t>(awake, 1)),
+                t.added_mm3 - (t.present_mm3 + t.sucked_mm3 + t.washed_mm3 + t.fallen_mm3));
+  }
+  std::printf("\n");
+}
+
 }  // namespace
 
 void bench_bone(const Context& context) {
@@ -332,6 +373,7 @@ void bench_bone(const Context& context) {
   bench_resample(context);
   bench_surface(context);
   bench_pieces(context);
+  bench_dust();
 }
 
 }  // namespace osteo

@@ -91,49 +91,115 @@ void Dust::step() {
     return key(x.at.i, x.at.j, x.at.k) < key(y.at.i, y.at.j, y.at.k);
   });
   for (const std::uint32_t b : awake_) bricks_[b]->awake = false;
-  const int side_axis[2] = {(axis_ + 1) % 3, (axis_ + 2) % 3};
   ++steps_;
-  for (const std::uint32_t b : awake_) {
-    Brick* const brick = bricks_[b].get();
-    for (int layer = 0; layer < 8; ++layer) {
-      const int along = sign_ > 0 ? 7 - layer : layer;
-      for (int n = 0; n < 64; ++n) {
-        // The other way round every other step, so that piles do not lean.
-        const int place = steps_ % 2 == 0 ? n : 63 - n;
-        int at[3];
-        at[axis_] = along;
-        at[side_axis[0]] = place & 7;
-        at[side_axis[1]] = place >> 3;
-        std::uint32_t& units = brick->units[static_cast<std::size_t>(at[0] | at[1] << 3 | at[2] << 6)];
-        if (units == 0) continue;
-        const Ijk c{brick->at.i * 8 + at[0], brick->at.j * 8 + at[1], brick->at.k * 8 + at[2]};
-        const std::uint32_t before = units;
-        move(units, stepped(c, axis_, sign_), units);
-        if (units > 0) {
-          // Down a slope: sideways and down at once, where both are free.
-          for (int s = 0; s < 4 && units > 0; ++s) {
-            const int turn = (s + static_cast<int>(steps_)) % 4;
-            const Ijk beside = stepped(c, side_axis[turn / 2], turn % 2 == 0 ? 1 : -1);
-            if (solid(beside)) continue;
-            move(units, stepped(beside, axis_, sign_), (units + 3 - static_cast<std::uint32_t>(s)) / (4 - static_cast<std::uint32_t>(s)));
-          }
-        }
-        if (units > capacity_ || (units > 0 && solid(c))) {
-          // Too full, or bone stands here (it was cut into by less than half): to the sides, then up.
-          std::uint32_t excess = solid(c) ? units : units - capacity_;
-          for (int s = 0; s < 4 && excess > 0; ++s) {
-            const int turn = (s + static_cast<int>(steps_)) % 4;
-            excess -= move(units, stepped(c, side_axis[turn / 2], turn % 2 == 0 ? 1 : -1),
-                           (excess + 3 - static_cast<std::uint32_t>(s)) / (4 - static_cast<std::uint32_t>(s)));
-          }
-          if (excess > 0) move(units, stepped(c, axis_, -sign_), excess);
-        }
-        if (units != before) {
-          wake(c);
-          wake(stepped(c, axis_, 2 * sign_));
+  for (const std::uint32_t b : awake_) step_brick(*bricks_[b]);
+}
+
+// One brick's cells. Its 26 neighbours are looked up once: nothing reaches farther in a step.
+void Dust::step_brick(Brick& brick) {
+  struct Neighbour {
+    Brick* dust = nullptr;
+    std::uint32_t bone = BrickGrid::kNone;
+  };
+  std::array<Neighbour, 27> hood;
+  for (int n = 0; n < 27; ++n) {
+    const Ijk at{brick.at.i + n % 3 - 1, brick.at.j + n / 3 % 3 - 1, brick.at.k + n / 9 - 1};
+    const auto found = index_.find(key(at.i, at.j, at.k));
+    hood[static_cast<std::size_t>(n)] = {found == index_.end() ? nullptr : bricks_[found->second].get(),
+                                         bone_.find_brick(at.i, at.j, at.k)};
+  }
+  // Cells by their place from the brick's first, -1 to 8 along each axis.
+  using Place = std::array<int, 3>;
+  const auto neighbour = [](const Place& p) {
+    return static_cast<std::size_t>(((p[0] >> 3) + 1) + ((p[1] >> 3) + 1) * 3 + ((p[2] >> 3) + 1) * 9);
+  };
+  const auto offset = [](const Place& p) { return BrickGrid::offset_in_brick(p[0], p[1], p[2]); };
+  const auto is_solid = [&](const Place& p) {
+    const std::uint32_t bone = hood[neighbour(p)].bone;
+    return bone != BrickGrid::kNone && bone_.value(bone * BrickGrid::kVoxels + offset(p)) >= 0.5F;
+  };
+  const auto give = [&](std::uint32_t& from, const Place& to, std::uint32_t most) -> std::uint32_t {
+    if (most == 0 || is_solid(to)) return 0;
+    Neighbour& n = hood[neighbour(to)];
+    std::uint32_t amount = std::min(most, capacity_);
+    if (n.dust == nullptr) {
+      const Ijk c{brick.at.i * 8 + to[0], brick.at.j * 8 + to[1], brick.at.k * 8 + to[2]};
+      if (!in_reach(c)) {
+        from -= most;
+        fallen_ += most;
+        return most;
+      }
+      static_cast<void>(cell(c, true));
+      n.dust = bricks_.back().get();
+    }
+    std::uint32_t& there = n.dust->units[offset(to)];
+    if (there >= capacity_) return 0;
+    amount = std::min(most, capacity_ - there);
+    there += amount;
+    from -= amount;
+    return amount;
+  };
+  std::uint32_t woken = 0;  // bits of the neighbourhood
+  const auto wake_around = [&](const Place& p) {
+    for (int k = (p[2] - 1) >> 3; k <= (p[2] + 1) >> 3; ++k)
+      for (int j = (p[1] - 1) >> 3; j <= (p[1] + 1) >> 3; ++j)
+        for (int i = (p[0] - 1) >> 3; i <= (p[0] + 1) >> 3; ++i) woken |= 1U << (i + 1 + (j + 1) * 3 + (k + 1) * 9);
+  };
+  const auto axis = static_cast<std::size_t>(axis_), side0 = (axis + 1) % 3, side1 = (axis + 2) % 3;
+  const auto turn0 = static_cast<int>(steps_ % 4);
+  for (int layer = 0; layer < 8; ++layer) {
+    for (int n = 0; n < 64; ++n) {
+      // The other way round every other step, so that piles do not lean.
+      const int place = steps_ % 2 == 0 ? n : 63 - n;
+      Place c{};
+      c[axis] = sign_ > 0 ? 7 - layer : layer;
+      c[side0] = place & 7;
+      c[side1] = place >> 3;
+      std::uint32_t& units = brick.units[offset(c)];
+      if (units == 0) continue;
+      const std::uint32_t before = units;
+      Place below = c;
+      below[axis] += sign_;
+      give(units, below, units);
+      const auto beside = [&](int s) {
+        const int turn = (s + turn0) % 4;
+        Place p = c;
+        p[turn < 2 ? side0 : side1] += turn % 2 == 0 ? 1 : -1;
+        return p;
+      };
+      const auto part_of = [](std::uint32_t amount, int s) {
+        return (amount + 3 - static_cast<std::uint32_t>(s)) / (4 - static_cast<std::uint32_t>(s));
+      };
+      // Down a slope: sideways and down at once, where both are free.
+      for (int s = 0; s < 4 && units > 0; ++s) {
+        Place p = beside(s);
+        if (is_solid(p)) continue;
+        p[axis] += sign_;
+        give(units, p, part_of(units, s));
+      }
+      if (units > 0) {
+        // Too full, or bone stands here (it was cut into by less than half): to the sides, then up.
+        std::uint32_t excess = is_solid(c) ? units : units - std::min(units, capacity_);
+        for (int s = 0; s < 4 && excess > 0; ++s) excess -= give(units, beside(s), part_of(excess, s));
+        if (excess > 0) {
+          Place above = c;
+          above[axis] -= sign_;
+          give(units, above, excess);
         }
       }
+      if (units == before) continue;
+      wake_around(c);
+      Place two = below;
+      two[axis] += sign_;
+      wake_around(two);
     }
+  }
+  for (int n = 0; n < 27; ++n) {
+    if ((woken >> n & 1) == 0) continue;
+    const auto found = index_.find(key(brick.at.i + n % 3 - 1, brick.at.j + n / 3 % 3 - 1, brick.at.k + n / 9 - 1));
+    if (found == index_.end() || bricks_[found->second]->awake) continue;
+    bricks_[found->second]->awake = true;
+    next_.push_back(found->second);
   }
 }
 

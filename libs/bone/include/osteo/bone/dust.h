@@ -62,6 +62,7 @@ class Dust {
   [[nodiscard]] bool in_reach(Ijk c) const;
   std::uint32_t* cell(Ijk c, bool make);
   void wake(Ijk c);
+  void step_brick(Brick& brick);
   std::uint32_t move(std::uint32_t& from, Ijk to, std::uint32_t most);
   template <class F>
   void in_ball(Vec3 centre_mm, double radius_mm, F&& f);
