@@ -271,7 +271,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
     const std::int64_t begin = monotonic_ns();
     const auto [record, changes] = renderer->step(bone, sample);
     ticks.add(monotonic_ns() - begin);
-    force = {static_cast<double>(record.force_n[0]), static_cast<double>(record.force_n[1]), static_cast<double>(record.force_n[2])};
+    force = from_floats(record.force_n);
   }
   j["tick_us"] = {{"p50_us", ticks.quantile_us(0.5)}, {"p99_us", ticks.quantile_us(0.99)}, {"p99_9_us", ticks.quantile_us(0.999)}};
   j["threads"] = {"servo (real time)", "recorder", "follower (surface, pieces)", "window"};

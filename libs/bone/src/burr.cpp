@@ -17,10 +17,6 @@ float efficiency_at(const Burr& burr, double sine_of_latitude) {
   return static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n));
 }
 
-std::array<float, 3> floats(Vec3 v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
 }  // namespace
 
 std::string Burr::name() const {
@@ -97,8 +93,8 @@ BurrSamples sample_burr(const Burr& burr) {
         const Vec3 p{(i + 0.5) * pitch, (j + 0.5) * pitch, (k + 0.5) * pitch};
         if (head.distance_mm(p) > 0) continue;
         const Vec3 inward = normalized(Vec3{0, 0, head.foot_mm(std::hypot(p.x, p.y), p.z)} - p);
-        s.offset_mm.push_back(floats(p));
-        s.inward.push_back(floats(inward));
+        s.offset_mm.push_back(to_floats(p));
+        s.inward.push_back(to_floats(inward));
         s.efficiency.push_back(efficiency_at(burr, inward.z));
       }
     }
@@ -133,8 +129,8 @@ BurrSurface sample_burr_surface(const Burr& burr, int samples) {
     }
     const double flat = std::sqrt(std::max(0.0, 1 - normal_z * normal_z));
     const Vec3 normal{flat * std::cos(angle), flat * std::sin(angle), normal_z};
-    s.offset_mm.push_back(floats(Vec3{0, 0, foot} + normal * radius));
-    s.inward.push_back(floats(-normal));
+    s.offset_mm.push_back(to_floats(Vec3{0, 0, foot} + normal * radius));
+    s.inward.push_back(to_floats(-normal));
     s.reach_mm.push_back(static_cast<float>(radius));
     s.efficiency.push_back(efficiency_at(burr, normal_z));
   }

@@ -55,7 +55,7 @@ double segment_area(double r, double c) {
 double cut_volume(const RoundCone& s, double sine, double cosine, double depth) {
   const double reach = std::max(s.start_radius_mm, s.length_mm * cosine + s.end_radius_mm);
   const double plane = reach - depth, lo = -s.start_radius_mm, hi = s.length_mm + s.end_radius_mm;
-  constexpr int kSlices = 256;
+  constexpr int kSlices = 128;
   const double b = s.slope(), a = std::sqrt(1 - b * b), step = (hi - lo) / kSlices;
   double sum = 0;
   for (int i = 0; i < kSlices; ++i) {
@@ -90,7 +90,7 @@ CutDepth::CutDepth(const RoundCone& shape)
     const double deepest = std::max(shape.start_radius_mm, shape.length_mm * cosine + shape.end_radius_mm) +
                            std::max(shape.start_radius_mm, -shape.length_mm * cosine + shape.end_radius_mm);
     // Volume as a function of depth, finer where it begins; then inverted.
-    constexpr int kDepths = 129;
+    constexpr int kDepths = 65;
     std::array<double, kDepths> depth{}, volume{};
     for (int d = 0; d < kDepths; ++d) {
       const double x = static_cast<double>(d) / (kDepths - 1);

@@ -14,10 +14,14 @@ TriMesh boundary_of(const TetMesh& mesh, std::vector<std::uint32_t>* point_of) {
   const auto corners = [&](std::uint32_t id) {
     const auto& t = mesh.tets[id / 4];
     switch (id % 4) {  // facing out
-      case 0: return std::array{t[1], t[2], t[3]};
-      case 1: return std::array{t[0], t[3], t[2]};
-      case 2: return std::array{t[0], t[1], t[3]};
-      default: return std::array{t[0], t[2], t[1]};
+      case 0:
+        return std::array{t[1], t[2], t[3]};
+      case 1:
+        return std::array{t[0], t[3], t[2]};
+      case 2:
+        return std::array{t[0], t[1], t[3]};
+      default:
+        return std::array{t[0], t[2], t[1]};
     }
   };
   const auto count = static_cast<std::uint32_t>(mesh.tets.size() * 4);

@@ -13,10 +13,6 @@ std::uint8_t age_ms(std::int64_t time_ns) noexcept {
   return static_cast<std::uint8_t>(std::clamp<std::int64_t>((monotonic_ns() - time_ns) / 1'000'000, 0, 255));
 }
 
-std::array<float, 3> floats(Vec3 v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
 // v turned about a unit axis (O. Rodrigues).
 Vec3 turned(Vec3 v, Vec3 axis, double angle) {
   return v * std::cos(angle) + cross(axis, v) * std::sin(angle) + axis * (dot(axis, v) * (1 - std::cos(angle)));
@@ -69,7 +65,7 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
   const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])}, turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
   goal_.position_mm += rotation_ * (move * (kFullMmPerS * dt_s));
   if (const double rate = length(turn); rate > 0) axis_ = normalized(turned(axis_, rotation_ * (turn / rate), rate * kFullRadPerS * dt_s));
-  goal_.axis = floats(axis_);
+  goal_.axis = to_floats(axis_);
   goal_.tool = tool_;
   const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
   goal_.drill_on = (s.buttons & 1U) != 0 || (pressed & 1U) != 0 ? 1 : 0;
@@ -81,7 +77,12 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
 
 WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
                                          const FootPedal* pedal)
-    : geometry_(geometry), kinematics_(geometry), map_(map), tool_(static_cast<std::uint8_t>(tool)), pedal_(pedal), link_(std::move(open), *this, 2) {}
+    : geometry_(geometry),
+      kinematics_(geometry),
+      map_(map),
+      tool_(static_cast<std::uint8_t>(tool)),
+      pedal_(pedal),
+      link_(std::move(open), *this, 2) {}
 
 DeviceTraits WoodenHapticsDevice::traits() const {
   // A report and its answer take a millisecond each over USB at full speed.
@@ -137,12 +138,12 @@ DeviceSample WoodenHapticsDevice::read(std::uint64_t, double, Vec3) noexcept {
   s.age_ms = age_ms(last_pose_.time_ns);
   if (last_pose_.time_ns == 0) {
     silent_ = true;
-    s.position_mm = floats(map_.last_mm());
+    s.position_mm = to_floats(map_.last_mm());
   } else {
-    s.position_mm = floats(map_.update(last_pose_.position_mm, (pressed & 2U) != 0 || silent_));
+    s.position_mm = to_floats(map_.update(last_pose_.position_mm, (pressed & 2U) != 0 || silent_));
     silent_ = false;
   }
-  s.axis = floats(normalized(map_.direction(last_pose_.axis)));
+  s.axis = to_floats(normalized(map_.direction(last_pose_.axis)));
   s.drill_on = last_pose_.button || (pressed & 1U) != 0 ? 1 : 0;
   s.tool = tool_;
   return s;

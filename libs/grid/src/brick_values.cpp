@@ -14,7 +14,8 @@ SparseGrid to_sparse(const Frame& frame, const std::string& name, std::span<cons
     for (int v = 0; v < 512; ++v) {
       if ((stored[8 * b + static_cast<std::size_t>(v >> 6)] >> (v & 63) & 1U) == 0) continue;
       // OpenVDB's leaves run z fastest.
-      leaf->setValueOn(openvdb::Coord(o.i * 8 + (v & 7), o.j * 8 + (v >> 3 & 7), o.k * 8 + (v >> 6)), values[512 * b + static_cast<std::size_t>(v)]);
+      leaf->setValueOn(openvdb::Coord(o.i * 8 + (v & 7), o.j * 8 + (v >> 3 & 7), o.k * 8 + (v >> 6)),
+                       values[512 * b + static_cast<std::size_t>(v)]);
     }
   }
   return grid::wrap(vdb, frame, name);

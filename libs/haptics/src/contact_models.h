@@ -7,11 +7,11 @@
 namespace osteo {
 
 [[nodiscard]] inline Vec3 position_of(const DeviceSample& s) {
-  return {static_cast<double>(s.position_mm[0]), static_cast<double>(s.position_mm[1]), static_cast<double>(s.position_mm[2])};
+  return from_floats(s.position_mm);
 }
 /// Unit; along z when the sample's is not usable.
 [[nodiscard]] inline Vec3 axis_of(const DeviceSample& s) {
-  const Vec3 a{static_cast<double>(s.axis[0]), static_cast<double>(s.axis[1]), static_cast<double>(s.axis[2])};
+  const Vec3 a = from_floats(s.axis);
   const double n = length(a);
   return std::isfinite(n) && n > 1e-6 ? a / n : Vec3{0, 0, 1};
 }

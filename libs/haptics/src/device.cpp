@@ -22,7 +22,7 @@ DeviceSample SpringHand::step(const HandGoal& goal, double dt_s, Vec3 force_n) n
   velocity_mm_s_ += total * (1000 * dt_s / kMassKg);
   position_mm_ += velocity_mm_s_ * dt_s;
   DeviceSample sample;
-  sample.position_mm = {static_cast<float>(position_mm_.x), static_cast<float>(position_mm_.y), static_cast<float>(position_mm_.z)};
+  sample.position_mm = to_floats(position_mm_);
   sample.axis = goal.axis;
   sample.drill_on = goal.drill_on;
   sample.tool = goal.tool;
@@ -40,7 +40,7 @@ DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n)
   while (leg_ + 1 < w.size() && w[leg_ + 1].t_s <= t) ++leg_;
   HandGoal goal;
   goal.tool = static_cast<std::uint8_t>(script_.tool);
-  goal.axis = {static_cast<float>(script_.axis.x), static_cast<float>(script_.axis.y), static_cast<float>(script_.axis.z)};
+  goal.axis = to_floats(script_.axis);
   goal.drill_on = w[leg_].drill_on ? 1 : 0;
   goal.position_mm = w[leg_].at_mm;
   if (leg_ + 1 < w.size()) {

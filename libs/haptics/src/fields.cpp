@@ -53,7 +53,8 @@ void CubicField::prepare() {
   const auto& f = frame_;
   if (f.dims[0] < 4 || f.dims[1] < 4 || f.dims[2] < 4 || values_.size() != f.voxel_count())
     throw Error(ExitCode::usage, "a field needs a value for each voxel, and at least 4 voxels along each axis");
-  if (std::abs(f.spacing_mm.x - f.spacing_mm.y) > 1e-6 * f.spacing_mm.x || std::abs(f.spacing_mm.x - f.spacing_mm.z) > 1e-6 * f.spacing_mm.x)
+  if (std::abs(f.spacing_mm.x - f.spacing_mm.y) > 1e-6 * f.spacing_mm.x ||
+      std::abs(f.spacing_mm.x - f.spacing_mm.z) > 1e-6 * f.spacing_mm.x)
     throw Error(ExitCode::usage, "a field needs voxels that are cubes", "resample the grid first");
   to_index_ = transposed(f.direction);
 }

@@ -9,10 +9,6 @@
 namespace osteo {
 namespace {
 
-std::array<float, 3> floats(Vec3 v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
 // Above this share of the head in bone the pushes begin to cancel; at the second the map alone gives the direction.
 constexpr double kEscapeFrom = 0.6, kEscapeAll = 0.9;
 constexpr double kFarthestMm = 1e6;  // no pose of a hand: broken, as is what is not a number
@@ -174,9 +170,9 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   }
 
   r.device = sample;
-  r.force_n = floats(out.force_n);
-  r.torque_n_mm = floats(std::isfinite(dot(torque, torque)) ? torque : Vec3{});
-  r.shown_offset_mm = floats(contact_.shown_offset_mm);
+  r.force_n = to_floats(out.force_n);
+  r.torque_n_mm = to_floats(std::isfinite(dot(torque, torque)) ? torque : Vec3{});
+  r.shown_offset_mm = to_floats(contact_.shown_offset_mm);
   r.normal_force_n = static_cast<float>(contact_.normal_force_n);
   r.depth_mm = static_cast<float>(contact_.depth_mm);
   r.removed_mm3 = static_cast<float>(removed);

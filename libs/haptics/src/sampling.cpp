@@ -17,9 +17,6 @@ Mat3 world_from_tool(Vec3 axis) {
   const Vec3 u = any_perpendicular(axis);
   return {{u, cross(axis, u), axis}};
 }
-Vec3 vec(const std::array<float, 3>& f) {
-  return {static_cast<double>(f[0]), static_cast<double>(f[1]), static_cast<double>(f[2])};
-}
 
 }  // namespace
 
@@ -42,12 +39,11 @@ VolumeSampling::VolumeSampling(const ContactParams& params) : params_(params) {
 
 void VolumeSampling::orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept {
   if (tool.oriented && tool.axis == axis) return;
-  const Mat3 to_world = world_from_tool(normalized(vec(axis))), to_index = transposed(bone.frame().direction);
+  const Mat3 to_world = world_from_tool(normalized(from_floats(axis))), to_index = transposed(bone.frame().direction);
   const double h = bone.frame().spacing_mm.x;
-  const auto floats = [](Vec3 v) { return std::array{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)}; };
   for (std::size_t s = 0; s < tool.offset_index.size(); ++s) {
-    tool.offset_index[s] = floats(to_index * (to_world * vec(tool.samples.offset_mm[s])) / h);
-    tool.inward_index[s] = floats(to_index * (to_world * vec(tool.samples.inward[s])));
+    tool.offset_index[s] = to_floats(to_index * (to_world * from_floats(tool.samples.offset_mm[s])) / h);
+    tool.inward_index[s] = to_floats(to_index * (to_world * from_floats(tool.samples.inward[s])));
   }
   tool.axis = axis;
   tool.oriented = true;
@@ -62,7 +58,7 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   cutting_ = pose.drill_on != 0;
   const Vec3 position = position_of(pose), axis = axis_of(pose);
   if (!finite(position)) return r;
-  orient(*tool_, bone, {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)});
+  orient(*tool_, bone, to_floats(axis));
 
   const Vec3 centre = bone.frame().index_from_world(position);
   const RoundCone head = burr_library()[number].head();
@@ -154,11 +150,11 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
   };
   Vec3 push;
   for (std::size_t s = 0; s < tool.offset_mm.size(); ++s) {
-    const Vec3 start = centre + to_index * (to_world * vec(tool.offset_mm[s])) / h;
+    const Vec3 start = centre + to_index * (to_world * from_floats(tool.offset_mm[s])) / h;
     if (density(start) < 0.5F) continue;
     ++r.immersed;
     // In half voxels towards the axis, as far as it goes in bone; the last step is cut where the density passes a half.
-    const Vec3 inward = to_index * (to_world * vec(tool.inward[s]));
+    const Vec3 inward = to_index * (to_world * from_floats(tool.inward[s]));
     const double reach = static_cast<double>(tool.reach_mm[s]) / h;
     double in = reach;
     float before = density(start);
@@ -180,7 +176,7 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
         last = voxel;
       }
     }
-    push += (to_world * vec(tool.inward[s])) * (in * h);
+    push += (to_world * from_floats(tool.inward[s])) * (in * h);
   }
   const double volume = length(push) * tool.sample_area_mm2;  // penetration times area
   if (!(volume > 0)) return r;

@@ -64,12 +64,9 @@ void Rehearsal::dust_tick(const TickRecord& tick, std::span<const VoxelChange> c
   // A hundred steps a second: 50 mm/s at half-millimetre voxels.
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(options_.rate_hz / 100)));
   if (tick.tick % every != 0) return;
-  const auto vec = [](const std::array<float, 3>& f) {
-    return Vec3{static_cast<double>(f[0]), static_cast<double>(f[1]), static_cast<double>(f[2])};
-  };
   if (tick.device.tool < burr_library().size())
-    dust_->push(burr_library()[tick.device.tool].head(), vec(tick.device.position_mm) + vec(tick.shown_offset_mm),
-                normalized(vec(tick.device.axis)));
+    dust_->push(burr_library()[tick.device.tool].head(), from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+                normalized(from_floats(tick.device.axis)));
   dust_->step();
 }
 

@@ -211,7 +211,8 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
     if (data == &s.mask && !mask_is_bone) continue;
     if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
     if (const auto* tets = std::get_if<Tets>(data)) return to_vtk(half_of(**tets, eye_direction(p.view)));
-    if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm") return to_vtk(zero_of(*grid, context));
+    if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm")
+      return to_vtk(zero_of(*grid, context));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
       return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
     }

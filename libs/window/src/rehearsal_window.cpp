@@ -175,7 +175,7 @@ class RehearsalWindow {
     renderer_->GetActiveCamera()->GetViewUp(up);
     const Vec3 right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
     const Vec3 axis = normalized(right * 0.62 + above * 0.45 - forward * 0.64);
-    goal_.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
+    goal_.axis = to_floats(axis);
     goal_.tool = static_cast<std::uint8_t>(tool_);
     goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
     Device& device = actions_.rehearsal().device();
@@ -287,10 +287,8 @@ class RehearsalWindow {
   void dust(Rehearsal& rehearsal, const TickRecord& tick) {
     rehearsal.with_dust([&](Dust& d) {
       if (ImGui::IsKeyDown(ImGuiKey_V)) {
-        const auto& x = tick.device.position_mm;
         constexpr double kNozzleMm = 4, kMm3PerS = 60;
-        d.suck({static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])}, kNozzleMm,
-               kMm3PerS * static_cast<double>(ImGui::GetIO().DeltaTime));
+        d.suck(from_floats(tick.device.position_mm), kNozzleMm, kMm3PerS * static_cast<double>(ImGui::GetIO().DeltaTime));
       }
       if (!dust_view_) dust_view_ = std::make_unique<DustView>(renderer_, rehearsal.bone().frame().spacing_mm.x);
       dust_view_->update(d);
@@ -298,7 +296,7 @@ class RehearsalWindow {
   }
 
   void place_tool(const TickRecord& tick) {
-    const Vec3 axis = normalized({tick.device.axis[0], tick.device.axis[1], tick.device.axis[2]});
+    const Vec3 axis = normalized(from_floats(tick.device.axis));
     const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
     const Vec3 columns[3] = {u, v, axis};
     for (int c = 0; c < 3; ++c) {

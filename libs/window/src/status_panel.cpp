@@ -16,8 +16,7 @@ const ImVec4 kAmber(1.0F, 0.8F, 0.35F, 1), kRed(1.0F, 0.45F, 0.35F, 1);
 }  // namespace
 
 void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
-  const double force =
-      std::hypot(static_cast<double>(tick.force_n[0]), static_cast<double>(tick.force_n[1]), static_cast<double>(tick.force_n[2]));
+  const double force = length(from_floats(tick.force_n));
   char text[64];
   std::snprintf(text, sizeof text, "%.2f N", force);
   ImGui::Text("Force");

@@ -41,6 +41,14 @@ inline Vec3 any_perpendicular(Vec3 a) {
   return normalized(std::abs(a.x) < 0.7 ? cross(a, Vec3{1, 0, 0}) : cross(a, Vec3{0, 1, 0}));
 }
 
+/// To and from records, which keep single precision.
+inline std::array<float, 3> to_floats(Vec3 v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+inline Vec3 from_floats(const std::array<float, 3>& f) {
+  return {static_cast<double>(f[0]), static_cast<double>(f[1]), static_cast<double>(f[2])};
+}
+
 /// Column vectors: for a direction matrix, column 0 is where the first index axis points.
 struct Mat3 {
   std::array<Vec3, 3> column{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};

@@ -30,7 +30,7 @@ class SimulatedDevice final : public Device {
     place_mm_ = place_mm;
     spring_ = spring_n_per_mm;
   }
-  void set_axis(Vec3 axis) { axis_ = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)}; }
+  void set_axis(Vec3 axis) { axis_ = to_floats(axis); }
   void set_drill(bool on, int tool) {
     drill_ = on;
     tool_ = static_cast<std::uint8_t>(tool);
