@@ -111,7 +111,7 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
       const double push = push_left(o, depth, shape) * params_.contact.force_n(depth);
       elastic += normal * push;
       torque += cross(axis, o.area_foot_mm3) * (-push / pressed);
-      flags_ |= kShaftContact;
+      if (push > 0) flags_ |= kShaftContact;
     }
   }
   Vec3 effects{};
