@@ -97,7 +97,6 @@ bool WoodenHapticsDevice::send(HidPort& port, std::array<double, 3> current_ma) 
 
 void WoodenHapticsDevice::opened(HidPort& port) {
   // The device speaks once it has been spoken to.
-  have_pose_ = false;
   send(port, {});
 }
 
@@ -110,7 +109,6 @@ void WoodenHapticsDevice::report(HidPort& port, std::span<const std::byte> bytes
   newest_angles_rad_ = kinematics_.angles_rad(r.encoder);
   newest_ = {kinematics_.position_mm(newest_angles_rad_), kinematics_.axis(newest_angles_rad_, r.encoder), r.button, monotonic_ns()};
   pose_.store(newest_);
-  have_pose_ = true;
   ForcePlane plane;
   if (!force_.try_load(plane)) plane = {};
   Vec3 force = extrapolate(plane, newest_.position_mm, newest_.time_ns);
@@ -125,7 +123,6 @@ void WoodenHapticsDevice::idle(HidPort& port) {
 }
 
 void WoodenHapticsDevice::gone() {
-  have_pose_ = false;
   Pose none = newest_;
   none.time_ns = 0;
   pose_.store(none);

@@ -171,6 +171,7 @@ RehearsalSummary Rehearsal::finish() {
     s.surface_hash = surface_hash(surface_->joined().mesh);
   }
   if (surface_reader_ != nullptr) s.dropped = surface_reader_->dropped;
+  s.voxel_mm3 = bone_.frame().voxel_volume_mm3();
   if (components_) s.pieces = large_pieces();
   if (dust_) s.dust = dust_->totals();
   if (recorder_) {

@@ -124,11 +124,9 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["session_bytes"] = s.session_bytes;
   j["ticks_lost_by_readers"] = s.dropped;
   if (!s.pieces.empty()) {
-    const BrickGrid bone = bone_at_end(session);
     j["pieces"] = ordered_json::array();
     for (const auto& p : s.pieces) {
-      j["pieces"].push_back(
-          {{"volume_mm3", p.mass * bone.frame().voxel_volume_mm3()}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
+      j["pieces"].push_back({{"volume_mm3", p.mass * s.voxel_mm3}, {"centre_mm", {p.centre_mm.x, p.centre_mm.y, p.centre_mm.z}}});
     }
   }
   if (s.dust) {

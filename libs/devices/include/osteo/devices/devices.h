@@ -137,7 +137,6 @@ class WoodenHapticsDevice final : public Device, HidHandler {
   bool silent_ = true;  // the next pose takes hold where the tool is
   Pose newest_;         // of the link
   Vec3 newest_angles_rad_;
-  bool have_pose_ = false;
   std::int64_t last_write_ns_ = 0;
   std::atomic<std::uint64_t> garbled_{0};
   HidLink link_;  // last: its thread uses all the others

@@ -40,6 +40,7 @@ struct RehearsalSummary {
   };
   std::map<std::uint32_t, StructureEvents> structures;
   std::optional<Dust::Totals> dust;  ///< where the scene has dust
+  double voxel_mm3 = 0;  ///< turns the mass of a piece into a volume
   std::vector<LiveComponents::Component> pieces;  ///< of at least kLeastPieceMm3, largest first; empty unless they were followed
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
 };
