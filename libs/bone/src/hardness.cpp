@@ -18,4 +18,12 @@ Hardness::Hardness(const BrickGrid& bone, const SparseGrid& hu) : steps_(bone.br
   }
 }
 
+Hardness::Hardness(const Hardness& whole, std::span<const std::uint32_t> bricks) {
+  steps_.reserve(bricks.size() * BrickGrid::kVoxels);
+  for (const std::uint32_t b : bricks) {
+    const auto first = whole.steps_.begin() + static_cast<std::ptrdiff_t>(b) * BrickGrid::kVoxels;
+    steps_.insert(steps_.end(), first, first + BrickGrid::kVoxels);
+  }
+}
+
 }  // namespace osteo

@@ -21,7 +21,7 @@ void join(std::vector<std::uint32_t>& parent, std::uint32_t a, std::uint32_t b) 
 }  // namespace
 
 LiveComponents::LiveComponents(const BrickGrid& bone, Connectivity connectivity)
-    : bone_(bone), bricks_(bone.brick_count()), is_dirty_(bone.brick_count(), 1), relink_(bone.brick_count(), 0) {
+    : bone_(&bone), bricks_(bone.brick_count()), is_dirty_(bone.brick_count(), 1), relink_(bone.brick_count(), 0) {
   for (int k = 0; k <= 1; ++k)
     for (int j = -1; j <= 1; ++j)
       for (int i = -1; i <= 1; ++i) {
@@ -33,8 +33,27 @@ LiveComponents::LiveComponents(const BrickGrid& bone, Connectivity connectivity)
   update();
 }
 
-void LiveComponents::mark(VoxelKey voxel) {
-  const std::uint32_t b = voxel / BrickGrid::kVoxels;
+LiveComponents::LiveComponents(const BrickGrid& piece, const LiveComponents& whole, const PieceOrigin& origin)
+    : bone_(&piece),
+      steps_(whole.steps_),
+      bricks_(piece.brick_count()),
+      is_dirty_(piece.brick_count(), 0),
+      relink_(piece.brick_count(), 0) {
+  std::vector<std::uint32_t> here(whole.bricks_.size(), kNone);
+  for (std::uint32_t b = 0; b < bricks_.size(); ++b) here[origin.brick[b]] = b;
+  for (std::uint32_t b = 0; b < bricks_.size(); ++b) {
+    if (origin.unchanged[b] == 0) {
+      mark_brick(b);
+      continue;
+    }
+    bricks_[b] = whole.bricks_[origin.brick[b]];
+    for (Link& l : bricks_[b].links) l.brick = here[l.brick];
+  }
+  if (dirty_.empty()) join_parts();
+  update();
+}
+
+void LiveComponents::mark_brick(std::uint32_t b) {
   if (is_dirty_[b] != 0) return;
   is_dirty_[b] = 1;
   dirty_.push_back(b);
@@ -46,7 +65,7 @@ void LiveComponents::label(std::uint32_t number) {
   brick.parts.clear();
   std::array<float, 512> density;
   for (std::uint32_t v = 0; v < 512; ++v) {
-    density[v] = bone_.value(number * BrickGrid::kVoxels + v);
+    density[v] = bone_->value(number * BrickGrid::kVoxels + v);
     if (density[v] >= kSolid) brick.solid[v >> 6] |= 1ULL << (v & 63);
   }
   std::array<std::uint16_t, 512> parent;
@@ -71,7 +90,7 @@ void LiveComponents::label(std::uint32_t number) {
       }
     }
   }
-  const Ijk o = bone_.brick_coordinate(number);
+  const Ijk o = bone_->brick_coordinate(number);
   std::array<std::uint8_t, 512> name{};
   for (std::uint16_t v = 0; v < 512; ++v) {
     if ((brick.solid[v >> 6] >> (v & 63) & 1) == 0) continue;
@@ -102,7 +121,7 @@ void LiveComponents::label(std::uint32_t number) {
 void LiveComponents::link(std::uint32_t number) {
   Brick& brick = bricks_[number];
   brick.links.clear();
-  const Ijk o = bone_.brick_coordinate(number);
+  const Ijk o = bone_->brick_coordinate(number);
   for (const Ijk s : steps_) {
     for (int k = 0; k < 8; ++k) {
       for (int j = 0; j < 8; ++j) {
@@ -114,7 +133,7 @@ void LiveComponents::link(std::uint32_t number) {
           const int x = i + s.i, y = j + s.j, z = k + s.k;
           const std::uint32_t v = static_cast<std::uint32_t>(k * 64 + j * 8 + i);
           if ((brick.solid[v >> 6] >> (v & 63) & 1) == 0) continue;
-          const std::uint32_t other = bone_.find_brick(o.i + (x >> 3), o.j + (y >> 3), o.k + (z >> 3));
+          const std::uint32_t other = bone_->find_brick(o.i + (x >> 3), o.j + (y >> 3), o.k + (z >> 3));
           if (other == BrickGrid::kNone) continue;
           const std::uint32_t w = BrickGrid::offset_in_brick(x, y, z);
           const Brick& there = bricks_[other];
@@ -142,12 +161,12 @@ std::span<const LiveComponents::Component> LiveComponents::update() {
   }
   for (const std::uint32_t b : dirty_) {
     relink(b);
-    const Ijk o = bone_.brick_coordinate(b);
+    const Ijk o = bone_->brick_coordinate(b);
     // Who links to it: bricks that have it further on, through a face, an edge or a corner.
     for (int k = -1; k <= 1; ++k)
       for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i) {
-          const std::uint32_t n = bone_.find_brick(o.i + i, o.j + j, o.k + k);
+          const std::uint32_t n = bone_->find_brick(o.i + i, o.j + j, o.k + k);
           if (n != BrickGrid::kNone && n != b) relink(n);
         }
   }
@@ -156,7 +175,11 @@ std::span<const LiveComponents::Component> LiveComponents::update() {
     link(b);
   }
   dirty_.clear();
+  join_parts();
+  return components_;
+}
 
+void LiveComponents::join_parts() {
   std::uint32_t parts = 0;
   for (Brick& b : bricks_) {
     b.first_part = parts;
@@ -191,7 +214,7 @@ std::span<const LiveComponents::Component> LiveComponents::update() {
       for (std::size_t a = 0; a < 6; ++a) sums[c].second[a] += b.parts[p].second[a];
     }
   }
-  const Frame& f = bone_.frame();
+  const Frame& f = bone_->frame();
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& part = components_[c];
     const double m = part.mass, h = f.spacing_mm.x;
@@ -214,7 +237,6 @@ std::span<const LiveComponents::Component> LiveComponents::update() {
     const double trace = world[0][0] + world[1][1] + world[2][2];
     part.inertia_mm2 = {trace - world[0][0], trace - world[1][1], trace - world[2][2], -world[0][1], -world[0][2], -world[1][2]};
   }
-  return components_;
 }
 
 std::uint32_t LiveComponents::component_of(VoxelKey voxel) const {

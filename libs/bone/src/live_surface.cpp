@@ -8,22 +8,30 @@
 namespace osteo {
 
 LiveSurface::LiveSurface(const BrickGrid& bone, const Context& context)
-    : bone_(bone), patches_(bone.brick_count()), is_dirty_(bone.brick_count()) {
+    : bone_(&bone), patches_(bone.brick_count()), is_dirty_(bone.brick_count()) {
   dirty_.reserve(bone.brick_count());
   parallel_for(patches_.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
-    for (std::size_t b = begin; b < end; ++b) extract_patch(bone_, static_cast<std::uint32_t>(b), 0.5F, patches_[b]);
+    for (std::size_t b = begin; b < end; ++b) extract_patch(*bone_, static_cast<std::uint32_t>(b), 0.5F, patches_[b]);
   });
 }
 
-void LiveSurface::mark(VoxelKey voxel) {
-  const Ijk c = bone_.coordinate(voxel);
-  // A patch depends on voxels up to 2 away: at most two bricks along each axis.
-  constexpr int kReach = 2;
-  for (int k = (c.k - kReach) >> 3; k <= (c.k + kReach) >> 3; ++k) {
-    for (int j = (c.j - kReach) >> 3; j <= (c.j + kReach) >> 3; ++j) {
-      for (int i = (c.i - kReach) >> 3; i <= (c.i + kReach) >> 3; ++i) {
-        const std::uint32_t b = bone_.find_brick(i, j, k);
+LiveSurface::LiveSurface(const BrickGrid& piece, const LiveSurface& whole, const PieceOrigin& origin)
+    : bone_(&piece), patches_(piece.brick_count()), is_dirty_(piece.brick_count()) {
+  for (std::uint32_t b = 0; b < patches_.size(); ++b) {
+    if (origin.unchanged[b] != 0) {
+      patches_[b] = whole.patches_[origin.brick[b]];
+    } else {
+      extract_patch(piece, b, 0.5F, patches_[b]);
+    }
+  }
+}
+
+void LiveSurface::mark_box(Ijk lo, Ijk hi) {
+  for (int k = lo.k; k <= hi.k; ++k) {
+    for (int j = lo.j; j <= hi.j; ++j) {
+      for (int i = lo.i; i <= hi.i; ++i) {
+        const std::uint32_t b = bone_->find_brick(i, j, k);
         if (b == BrickGrid::kNone || is_dirty_[b]) continue;
         is_dirty_[b] = true;
         dirty_.push_back(b);
@@ -32,13 +40,25 @@ void LiveSurface::mark(VoxelKey voxel) {
   }
 }
 
+void LiveSurface::mark(VoxelKey voxel) {
+  const Ijk c = bone_->coordinate(voxel);
+  // A patch depends on voxels up to 2 away: at most two bricks along each axis.
+  constexpr int kReach = 2;
+  mark_box({(c.i - kReach) >> 3, (c.j - kReach) >> 3, (c.k - kReach) >> 3}, {(c.i + kReach) >> 3, (c.j + kReach) >> 3, (c.k + kReach) >> 3});
+}
+
+void LiveSurface::mark_brick(std::uint32_t brick) {
+  const Ijk o = bone_->brick_coordinate(brick);
+  mark_box({o.i - 1, o.j - 1, o.k - 1}, {o.i + 1, o.j + 1, o.k + 1});
+}
+
 std::span<const std::uint32_t> LiveSurface::update() {
   done_.swap(dirty_);
   dirty_.clear();
   std::sort(done_.begin(), done_.end());
   for (const std::uint32_t b : done_) {
     is_dirty_[b] = false;
-    extract_patch(bone_, b, 0.5F, patches_[b]);
+    extract_patch(*bone_, b, 0.5F, patches_[b]);
   }
   return done_;
 }

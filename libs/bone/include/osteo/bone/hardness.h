@@ -1,6 +1,7 @@
 // How much each voxel of bone resists the burr.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "osteo/data/sparse_grid.h"
@@ -16,6 +17,8 @@ class Hardness {
   static constexpr double kCorticalHu = 1500;
   /// From the HU of the case, sampled at the voxels of the bone. Voxels without HU count as cortical.
   Hardness(const BrickGrid& bone, const SparseGrid& hu);
+  /// Of a piece: its bricks are these of the whole.
+  Hardness(const Hardness& whole, std::span<const std::uint32_t> bricks);
   [[nodiscard]] float at(VoxelKey voxel) const { return static_cast<float>(steps_[voxel]) / 64.0F; }
   [[nodiscard]] std::size_t memory_bytes() const { return steps_.size(); }
 

@@ -1,5 +1,6 @@
 // Bone in pieces: each with a place of its own.
 #pragma once
+#include <utility>
 #include <vector>
 
 #include "osteo/bone/live_components.h"
@@ -7,41 +8,25 @@
 
 namespace osteo {
 
-/// world = rotation * piece + shift.
-struct RigidTransform {
-  Mat3 rotation{};
-  Vec3 shift_mm{};
-  [[nodiscard]] Vec3 operator()(Vec3 p) const { return rotation * p + shift_mm; }
-  /// First `b`, then `a`.
-  friend RigidTransform operator*(const RigidTransform& a, const RigidTransform& b) {
-    RigidTransform r;
-    for (std::size_t c = 0; c < 3; ++c) r.rotation.column[c] = a.rotation * b.rotation.column[c];
-    r.shift_mm = a(b.shift_mm);
-    return r;
-  }
-  [[nodiscard]] RigidTransform inverse() const {
-    const Mat3 back = transposed(rotation);
-    return {back, back * shift_mm * -1};
-  }
-};
-/// About an axis (unit) through a point.
-[[nodiscard]] RigidTransform rotation_about(Vec3 point_mm, Vec3 axis, double angle_rad);
-
-/// A piece of bone in the frame it was cut in, and where it is now.
+/// A piece of bone in the frame it was cut in.
 struct Piece {
-  BrickGrid bone;
-  RigidTransform world_from_piece;
-  LiveComponents::Component solid;  ///< voxels, mass (sum of densities), centre, inertia, in the piece's own frame
+  BrickGrid bone;                   ///< the first piece keeps all bricks of the whole, and so its voxels their names; others only what they hold
+  LiveComponents::Component solid;  ///< of the whole: voxels, mass (sum of densities), centre, inertia
   double volume_mm3 = 0;            ///< of all its density
+  PieceOrigin origin;               ///< empty for the first
 };
 
 struct Split {
   std::vector<Piece> pieces;  ///< largest first
   double crumbs_mm3 = 0;      ///< density of what hung together with nothing, or with too little: dust
   std::uint64_t crumbs = 0;   ///< parts that were too small
+  std::vector<std::uint32_t> changed_bricks;  ///< of the first piece: not as in the whole any more, ascending
+  std::vector<std::pair<VoxelKey, float>> loose;  ///< of the whole: voxels with the density that crumbs had there
 };
-/// Takes bone apart along its components. A voxel of density below a half belongs to the part that most of its 26 neighbours belong to (the
-/// first of equals); one without solid neighbours is dust. No density is lost: pieces and crumbs sum to the whole. O(bricks).
+/// Takes bone apart along its components. A voxel of density below a half near more than one of them belongs to the part that most of its
+/// 26 neighbours belong to (the first of equals); one without solid neighbours there is dust. No density is lost: pieces and crumbs sum to
+/// the whole. `components` of this bone, up to date. Cost: a copy of the bone, and 2 us for each brick where parts meet.
+[[nodiscard]] Split split_bone(const BrickGrid& bone, const LiveComponents& components, double least_mm3);
 [[nodiscard]] Split split_bone(const BrickGrid& bone, double least_mm3, Connectivity connectivity = Connectivity::face);
 
 }  // namespace osteo

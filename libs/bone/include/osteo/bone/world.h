@@ -1,0 +1,169 @@
+// What the scene is made of while it is operated on: bone in pieces, plates on it, and what has been done to them.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "osteo/bone/hardness.h"
+#include "osteo/bone/live_components.h"
+#include "osteo/bone/pieces.h"
+#include "osteo/bone/rigid_transform.h"
+#include "osteo/bone/saw.h"
+
+namespace osteo {
+
+/// What is done to a scene besides drilling.
+enum class ActionKind : std::uint32_t {
+  hold = 1,  ///< nothing may be removed until the next action: something is being prepared
+  resume,    ///< it may again
+  saw,       ///< take out a blade's width
+  split,     ///< take apart what does not hang together
+  move,      ///< put a piece somewhere, and all that is plated to it
+  grip,      ///< turn the plate in the hand
+  attach,    ///< fix a plate to one piece or two
+  detach,    ///< take a plate off
+  open,      ///< set the gap of a distractor
+  suction,   ///< a sucker at a place; rate 0: away
+  irrigate,  ///< water at a place; share 0: away
+  undo,      ///< take back the last saw, split, move, attach, detach or open
+};
+
+/// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
+struct SceneAction {
+  static constexpr std::uint32_t kNobody = 0xffffffffU;
+
+  std::uint64_t tick = 0;
+  std::uint32_t kind = 0;        ///< ActionKind
+  std::uint32_t body = kNobody;  ///< id of a piece. saw: only this one, or all. attach: the one that the plate stays with
+  std::uint32_t other = kNobody; ///< attach: the second piece, which a distractor moves
+  std::uint32_t item = 0;        ///< attach: index in plate_library(); detach, open: id of the fixture
+  std::array<double, 12> values{};
+
+  [[nodiscard]] bool is(ActionKind k) const { return kind == static_cast<std::uint32_t>(k); }
+  static SceneAction plain(ActionKind kind);                          ///< hold, resume, undo
+  static SceneAction saw(const SawCut& cut, std::uint32_t body = kNobody);  ///< in the world
+  static SceneAction split(double least_mm3);
+  static SceneAction move(std::uint32_t body, const RigidTransform& world_from_body);
+  static SceneAction grip(const RigidTransform& hand_from_plate);
+  static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other = kNobody);
+  static SceneAction detach(std::uint32_t fixture);
+  static SceneAction open(std::uint32_t fixture, double opening_mm);
+  static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
+  static SceneAction irrigate(Vec3 at_mm, double radius_mm, double share_per_s);
+  [[nodiscard]] SawCut saw_cut() const;
+  [[nodiscard]] RigidTransform transform() const;
+};
+static_assert(sizeof(SceneAction) == 120);
+
+/// "hold", "saw", ...; "?" for what is none.
+[[nodiscard]] std::string_view name_of(ActionKind kind);
+
+/// A piece of bone and where it is. The grid never moves: a pose carries it into the world.
+struct Body {
+  std::uint32_t id = 0;
+  std::uint32_t first_brick = 0;  ///< its bricks are numbered from here in the stream, so that a voxel has one name in all pieces
+  BrickGrid bone;
+  std::shared_ptr<const Hardness> hardness;  ///< null where the scene does not go by it
+  [[nodiscard]] VoxelKey name_of(VoxelKey own) const { return own + first_brick * BrickGrid::kVoxels; }
+};
+
+struct PlacedBody {
+  std::shared_ptr<Body> body;
+  RigidTransform world_from_body;
+  bool of_region = false;  ///< a finer part of the first body, which it always moves with and is never split from
+};
+
+/// A plate on bone. It holds two pieces together, or with `other` none, sits on one.
+struct Fixture {
+  std::uint32_t id = 0;
+  std::uint32_t plate = 0;  ///< index in plate_library()
+  std::uint32_t body = 0, other = SceneAction::kNobody;
+  RigidTransform body_from_plate;
+  double opening_mm = 0;
+};
+
+/// Bodies and fixtures change by act() alone; densities of bodies also by the servo. act() never writes into a body that is there: where
+/// density changes it puts a new one in its place, so that whoever still reads the old is not disturbed.
+class World {
+ public:
+  /// Names are 32 bits wide: room for 8 million bricks.
+  explicit World(BrickGrid bone, std::shared_ptr<const Hardness> hardness = nullptr);
+  /// A part of the first body in finer voxels: in its box the coarse bone is taken out, so that each place belongs to one of them. A world
+  /// with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along faces of the first body's voxels.
+  void add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness = nullptr);
+
+  [[nodiscard]] const std::vector<PlacedBody>& bodies() const { return bodies_; }
+  [[nodiscard]] const std::vector<Fixture>& fixtures() const { return fixtures_; }
+  [[nodiscard]] const PlacedBody* find(std::uint32_t body) const;
+  /// The body that a voxel of the stream belongs to; null when there is none.
+  [[nodiscard]] const PlacedBody* owner(VoxelKey name) const;
+  [[nodiscard]] const RigidTransform& grip() const { return grip_; }
+  [[nodiscard]] bool held() const { return held_; }
+  /// How many steps undo can take back.
+  [[nodiscard]] std::size_t undo_steps() const { return done_.size(); }
+
+  struct Effect {
+    bool done = true;
+    std::string message;  ///< why nothing was done
+    /// Bodies with the same id, of which these bricks differ (a new grid took the old one's place).
+    struct Changed {
+      std::uint32_t body;
+      std::vector<std::uint32_t> bricks;
+    };
+    std::vector<Changed> changed;
+    /// Bodies that were not there before, each with how it came out of `from`.
+    struct Made {
+      std::uint32_t body, from;
+      PieceOrigin origin;
+    };
+    std::vector<Made> made;
+    std::vector<std::uint32_t> gone;
+    std::vector<std::pair<VoxelKey, float>> dust;  ///< names of voxels and the density that became dust there
+  };
+  /// Cost: moves and plates nothing; saw and split a copy of each bone they change. `components` of a body (by id), up to date; where it is
+  /// empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing changed.
+  using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
+  Effect act(const SceneAction& action, const ComponentsOf& components = {});
+
+  /// Of bodies, poses and fixtures; the bone's own hash where there is one body, unmoved, and nothing on it.
+  [[nodiscard]] std::string hash() const;
+  /// Density over all bodies, mm3.
+  [[nodiscard]] double volume_mm3() const;
+
+ private:
+  struct Change {
+    VoxelKey voxel;
+    float before, after;
+  };
+  // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since stays drilled.
+  struct Done {
+    ActionKind kind;
+    std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
+    std::vector<Fixture> fixtures;
+    std::vector<std::pair<std::uint32_t, std::vector<Change>>> sawn;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> children;  // body, the one it came from
+    std::vector<std::pair<VoxelKey, float>> loose;                  // names
+  };
+  PlacedBody* placed(std::uint32_t body);
+  [[nodiscard]] std::vector<std::uint32_t> joined_to(std::uint32_t body, std::uint32_t except_fixture) const;
+  void move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by);
+  [[nodiscard]] Done snapshot(ActionKind kind) const;
+  void remember(Done done);
+  Effect saw(const SceneAction& a);
+  Effect split(const SceneAction& a, const ComponentsOf& components);
+  Effect undo();
+
+  std::vector<PlacedBody> bodies_;
+  std::vector<Fixture> fixtures_;
+  std::vector<Done> done_;
+  RigidTransform grip_;
+  std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
+  bool held_ = false;
+};
+
+}  // namespace osteo

@@ -1,0 +1,380 @@
+#include "osteo/bone/world.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/bone/plates.h"
+
+namespace osteo {
+namespace {
+
+World::Effect nothing(std::string why) {
+  World::Effect e;
+  e.done = false;
+  e.message = std::move(why);
+  return e;
+}
+
+// Columns at right angles, of length one, right-handed, to what a pose built in doubles has.
+bool is_rigid(const RigidTransform& t) {
+  const auto& c = t.rotation.column;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = i; j < 3; ++j) {
+      if (!(std::abs(dot(c[i], c[j]) - (i == j ? 1 : 0)) < 1e-6)) return false;
+    }
+  }
+  return determinant(t.rotation) > 0 && std::isfinite(dot(t.shift_mm, t.shift_mm)) && length(t.shift_mm) < 1e6;
+}
+
+}  // namespace
+
+World::World(BrickGrid bone, std::shared_ptr<const Hardness> hardness) {
+  auto body = std::make_shared<Body>();
+  body->bone = std::move(bone);
+  body->hardness = std::move(hardness);
+  next_brick_ = static_cast<std::uint32_t>(body->bone.brick_count());
+  bodies_.push_back({std::move(body), {}, false});
+}
+
+void World::add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness) {
+  Body& coarse = *bodies_.front().body;
+  const Frame& c = coarse.bone.frame();
+  const Frame& f = fine.frame();
+  const auto refuse = [](const std::string& what) {
+    return Error(ExitCode::usage, "the region of interest does not fit the bone: " + what,
+                 "make it with resample: the same axes, and a box of whole voxels of the coarser bone");
+  };
+  if (bodies_.size() != 1) throw refuse("there is one already");
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (length(c.direction.column[a] - f.direction.column[a]) > 1e-6) throw refuse("its axes point elsewhere");
+  }
+  const Vec3 lo = c.index_from_world(f.world_from_index({-0.5, -0.5, -0.5}));
+  const Vec3 hi = c.index_from_world(f.world_from_index({f.dims[0] - 0.5, f.dims[1] - 0.5, f.dims[2] - 0.5}));
+  int first[3], last[3];
+  for (std::size_t a = 0; a < 3; ++a) {
+    first[a] = static_cast<int>(std::lround(lo[a] + 0.5));
+    last[a] = static_cast<int>(std::lround(hi[a] - 0.5));
+    if (std::abs(first[a] - 0.5 - lo[a]) > 0.01 || std::abs(last[a] + 0.5 - hi[a]) > 0.01)
+      throw refuse("its box cuts through voxels of the bone");
+  }
+  for (int k = first[2]; k <= last[2]; ++k) {
+    for (int j = first[1]; j <= last[1]; ++j) {
+      for (int i = first[0]; i <= last[0]; ++i) {
+        if (const VoxelKey v = coarse.bone.find(i, j, k); v != BrickGrid::kNone) coarse.bone.set(v, 0);
+      }
+    }
+  }
+  auto body = std::make_shared<Body>();
+  body->id = next_body_++;
+  body->first_brick = next_brick_;
+  next_brick_ += static_cast<std::uint32_t>(fine.brick_count());
+  body->bone = std::move(fine);
+  body->hardness = std::move(hardness);
+  bodies_.push_back({std::move(body), {}, true});
+}
+
+const PlacedBody* World::find(std::uint32_t id) const {
+  const auto it = std::find_if(bodies_.begin(), bodies_.end(), [&](const PlacedBody& b) { return b.body->id == id; });
+  return it == bodies_.end() ? nullptr : &*it;
+}
+PlacedBody* World::placed(std::uint32_t id) {
+  return const_cast<PlacedBody*>(find(id));
+}
+
+const PlacedBody* World::owner(VoxelKey name) const {
+  const std::uint32_t brick = name / BrickGrid::kVoxels;
+  for (const PlacedBody& b : bodies_) {
+    if (brick >= b.body->first_brick && brick < b.body->first_brick + b.body->bone.brick_count()) return &b;
+  }
+  return nullptr;
+}
+
+World::Done World::snapshot(ActionKind kind) const {
+  Done d;
+  d.kind = kind;
+  for (const PlacedBody& b : bodies_) d.poses.emplace_back(b.body->id, b.world_from_body);
+  d.fixtures = fixtures_;
+  return d;
+}
+
+void World::remember(Done done) {
+  // Dragging is one move, not one for each picture: only where it began is kept.
+  const bool goes_on = done.kind == ActionKind::move && !done_.empty() && done_.back().kind == ActionKind::move;
+  const bool opens_on = done.kind == ActionKind::open && !done_.empty() && done_.back().kind == ActionKind::open;
+  if (!goes_on && !opens_on) done_.push_back(std::move(done));
+}
+
+std::vector<std::uint32_t> World::joined_to(std::uint32_t body, std::uint32_t except) const {
+  std::vector<std::uint32_t> group{body};
+  const auto add = [&](std::uint32_t id) {
+    if (std::find(group.begin(), group.end(), id) == group.end()) group.push_back(id);
+  };
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    for (const Fixture& f : fixtures_) {
+      if (f.id == except || f.other == SceneAction::kNobody) continue;
+      if (f.body == group[i]) add(f.other);
+      if (f.other == group[i]) add(f.body);
+    }
+    const bool whole = group[i] == bodies_.front().body->id || find(group[i])->of_region;
+    for (std::size_t b = 0; b < bodies_.size() && whole; ++b) {
+      if (b == 0 || bodies_[b].of_region) add(bodies_[b].body->id);
+    }
+  }
+  return group;
+}
+
+void World::move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by) {
+  for (const std::uint32_t id : group) {
+    PlacedBody* const b = placed(id);
+    b->world_from_body = by * b->world_from_body;
+  }
+}
+
+World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
+  Effect effect;
+  const bool was_held = std::exchange(held_, a.is(ActionKind::hold));
+  for (const double v : a.values) {
+    if (!std::isfinite(v)) return nothing("a number of the action is not finite");
+  }
+  const auto known = [&](std::uint32_t id) { return find(id) != nullptr; };
+  const auto fixture = std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
+  switch (static_cast<ActionKind>(a.kind)) {
+    case ActionKind::hold:
+    case ActionKind::resume:
+      break;
+    case ActionKind::saw:
+      return saw(a);
+    case ActionKind::split:
+      return split(a, components);
+    case ActionKind::undo:
+      return undo();
+    case ActionKind::suction:
+    case ActionKind::irrigate:
+      held_ = was_held;
+      break;
+    case ActionKind::grip:
+      held_ = was_held;
+      if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
+      grip_ = a.transform();
+      break;
+    case ActionKind::move: {
+      if (!known(a.body)) return nothing("there is no piece " + std::to_string(a.body));
+      if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
+      Done before = snapshot(ActionKind::move);
+      const RigidTransform by = a.transform() * find(a.body)->world_from_body.inverse();
+      move_group(joined_to(a.body, SceneAction::kNobody), by);
+      placed(a.body)->world_from_body = a.transform();  // to the bit
+      remember(std::move(before));
+      break;
+    }
+    case ActionKind::attach: {
+      if (a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));
+      if (!known(a.body) || (a.other != SceneAction::kNobody && !known(a.other)) || a.body == a.other)
+        return nothing("a plate is attached to one piece, or to two that are not the same");
+      if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
+      remember(snapshot(ActionKind::attach));
+      Fixture f;
+      f.id = next_fixture_++;
+      f.plate = a.item;
+      f.body = a.body;
+      f.other = a.other;
+      f.body_from_plate = find(a.body)->world_from_body.inverse() * a.transform();
+      fixtures_.push_back(f);
+      break;
+    }
+    case ActionKind::detach:
+      if (fixture == fixtures_.end()) return nothing("there is no plate fixed as number " + std::to_string(a.item));
+      remember(snapshot(ActionKind::detach));
+      fixtures_.erase(fixture);
+      break;
+    case ActionKind::open: {
+      if (fixture == fixtures_.end()) return nothing("there is no plate fixed as number " + std::to_string(a.item));
+      const double most = plate_library()[fixture->plate].most_opening_mm;
+      if (most <= 0) return nothing("'" + plate_library()[fixture->plate].name + "' is no distractor");
+      if (fixture->other == SceneAction::kNobody) return nothing("the distractor is fixed to one piece only");
+      Done before = snapshot(ActionKind::open);
+      const double opening = std::clamp(a.values[0], 0.0, most);
+      const std::vector<std::uint32_t> group = joined_to(fixture->other, fixture->id);
+      if (std::find(group.begin(), group.end(), fixture->body) != group.end())
+        return nothing("another plate holds the two pieces together");
+      const Vec3 along = (find(fixture->body)->world_from_body * fixture->body_from_plate).rotation.column[0];
+      move_group(group, {Mat3{}, along * (opening - fixture->opening_mm)});
+      fixture->opening_mm = opening;
+      remember(std::move(before));
+      break;
+    }
+    default:
+      return nothing("unknown action " + std::to_string(a.kind));
+  }
+  return effect;
+}
+
+World::Effect World::saw(const SceneAction& a) {
+  const SawCut cut = a.saw_cut();
+  if (!(length(cut.normal) > 1e-9) || !(cut.kerf_mm > 0)) return nothing("a saw cut needs a direction and a width");
+  Effect effect;
+  Done before = snapshot(ActionKind::saw);
+  for (PlacedBody& placed : bodies_) {
+    if (a.body != SceneAction::kNobody && a.body != placed.body->id) continue;
+    SawCut own = cut;
+    const RigidTransform back = placed.world_from_body.inverse();
+    own.at_mm = back(cut.at_mm);
+    own.normal = back.rotation * cut.normal;
+    own.along = back.rotation * cut.along;
+    auto sawn = std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, BrickGrid(placed.body->bone), placed.body->hardness});
+    std::vector<VoxelKey> changed;
+    apply_saw(sawn->bone, own, changed);
+    if (changed.empty()) continue;
+    Effect::Changed bricks{sawn->id, {}};
+    std::vector<Change> changes;
+    for (const VoxelKey v : changed) {
+      const float was = placed.body->bone.value(v), is = sawn->bone.value(v);
+      changes.push_back({v, was, is});
+      effect.dust.emplace_back(sawn->name_of(v), was - is);
+      if (bricks.bricks.empty() || bricks.bricks.back() != v / BrickGrid::kVoxels) bricks.bricks.push_back(v / BrickGrid::kVoxels);
+    }
+    before.sawn.emplace_back(sawn->id, std::move(changes));
+    effect.changed.push_back(std::move(bricks));
+    placed.body = std::move(sawn);
+  }
+  if (effect.changed.empty()) return nothing("the saw meets no bone");
+  remember(std::move(before));
+  return effect;
+}
+
+World::Effect World::split(const SceneAction& a, const ComponentsOf& components) {
+  if (std::any_of(bodies_.begin(), bodies_.end(), [](const PlacedBody& b) { return b.of_region; }))
+    return nothing("bone with a region of interest is not taken apart");
+  Effect effect;
+  Done before = snapshot(ActionKind::split);
+  std::vector<PlacedBody> bodies;
+  std::vector<PlacedBody> made;
+  for (const PlacedBody& placed : bodies_) {
+    bodies.push_back(placed);
+    const BrickGrid& bone = placed.body->bone;
+    const LiveComponents* labels = components ? components(placed.body->id) : nullptr;
+    std::unique_ptr<LiveComponents> own;
+    if (labels == nullptr) {
+      own = std::make_unique<LiveComponents>(bone);
+      labels = own.get();
+    }
+    if (labels->components().size() < 2) continue;
+    Split split = split_bone(bone, *labels, a.values[0]);
+    // What is all crumbs stays as it is: a scene has at least the body it began with.
+    if (split.pieces.empty() || split.changed_bricks.empty()) continue;
+    if (next_brick_ + bone.brick_count() * split.pieces.size() >= (1U << 23)) return nothing("too many pieces: voxels have no names left");
+    for (const auto& [voxel, density] : split.loose) {
+      before.loose.emplace_back(placed.body->name_of(voxel), density);
+      effect.dust.emplace_back(placed.body->name_of(voxel), density);
+    }
+    effect.changed.push_back({placed.body->id, std::move(split.changed_bricks)});
+    bodies.back().body = std::make_shared<Body>(
+        Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
+    for (std::size_t p = 1; p < split.pieces.size(); ++p) {
+      Piece& piece = split.pieces[p];
+      auto body = std::make_shared<Body>(Body{next_body_++, next_brick_, std::move(piece.bone), nullptr});
+      next_brick_ += static_cast<std::uint32_t>(body->bone.brick_count());
+      if (placed.body->hardness) body->hardness = std::make_shared<const Hardness>(*placed.body->hardness, piece.origin.brick);
+      before.children.emplace_back(body->id, placed.body->id);
+      effect.made.push_back({body->id, placed.body->id, std::move(piece.origin)});
+      made.push_back({std::move(body), placed.world_from_body, false});
+    }
+  }
+  if (effect.changed.empty()) return nothing("the bone hangs together");
+  bodies_ = std::move(bodies);
+  bodies_.insert(bodies_.end(), made.begin(), made.end());
+  remember(std::move(before));
+  return effect;
+}
+
+World::Effect World::undo() {
+  if (done_.empty()) return nothing("there is nothing to take back");
+  Effect effect;
+  const Done last = std::move(done_.back());
+  done_.pop_back();
+  // New grids in place of those that get density back.
+  std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> touched;
+  const auto renewed = [&](std::uint32_t id) -> std::pair<Body*, std::vector<std::uint32_t>*> {
+    for (auto& [body, bricks] : touched) {
+      if (body == id) return {find(id)->body.get(), &bricks};
+    }
+    PlacedBody* const old = placed(id);
+    old->body = std::make_shared<Body>(Body{id, old->body->first_brick, BrickGrid(old->body->bone), old->body->hardness});
+    touched.emplace_back(id, std::vector<std::uint32_t>());
+    return {old->body.get(), &touched.back().second};
+  };
+  const auto give_back = [&](std::uint32_t id, VoxelKey v, float density) {
+    const auto [body, bricks] = renewed(id);
+    body->bone.set(v, std::clamp(body->bone.value(v) + density, 0.0F, 1.0F));
+    if (bricks->empty() || bricks->back() != v / BrickGrid::kVoxels) bricks->push_back(v / BrickGrid::kVoxels);
+  };
+  for (const auto& [child, parent] : last.children) {
+    const PlacedBody piece = *find(child);
+    const BrickGrid& from = piece.body->bone;
+    const BrickGrid& to = find(parent)->body->bone;  // same bricks, whether renewed or not
+    for (VoxelKey v = 0; v < from.brick_count() * BrickGrid::kVoxels; ++v) {
+      const float density = from.value(v);
+      if (density <= 0) continue;
+      const Ijk c = from.coordinate(v);
+      give_back(parent, to.find(c.i, c.j, c.k), density);
+    }
+    bodies_.erase(bodies_.begin() + (find(child) - bodies_.data()));
+    effect.gone.push_back(child);
+  }
+  for (const auto& [name, density] : last.loose) {
+    const PlacedBody* const b = owner(name);
+    give_back(b->body->id, name - b->body->name_of(0), density);
+  }
+  for (const auto& [id, changes] : last.sawn) {
+    for (const Change& c : changes) {
+      const auto [body, bricks] = renewed(id);
+      const float now = body->bone.value(c.voxel);
+      // To the bit where nothing was drilled since.
+      give_back(id, c.voxel, 0);
+      body->bone.set(c.voxel, now == c.after ? c.before : std::clamp(now + c.before - c.after, 0.0F, 1.0F));
+    }
+  }
+  for (const auto& [id, pose] : last.poses) {
+    if (PlacedBody* const b = placed(id); b != nullptr) b->world_from_body = pose;
+  }
+  fixtures_ = last.fixtures;
+  for (auto& [id, bricks] : touched) {
+    std::sort(bricks.begin(), bricks.end());
+    bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+    effect.changed.push_back({id, std::move(bricks)});
+  }
+  return effect;
+}
+
+std::string World::hash() const {
+  const auto& first = bodies_.front();
+  if (bodies_.size() == 1 && fixtures_.empty() && first.world_from_body.rotation == Mat3{} && first.world_from_body.shift_mm == Vec3{})
+    return first.body->bone.hash();
+  Hasher h;
+  const auto add = [&](const auto& v) { h.add(&v, sizeof v); };
+  for (const PlacedBody& b : bodies_) {
+    const std::string bone = b.body->bone.hash();
+    h.add(bone.data(), bone.size());
+    add(b.body->id);
+    add(b.world_from_body);
+  }
+  for (const Fixture& f : fixtures_) {
+    add(f.id);
+    add(f.plate);
+    add(f.body);
+    add(f.other);
+    add(f.body_from_plate);
+    add(f.opening_mm);
+  }
+  return h.hex();
+}
+
+double World::volume_mm3() const {
+  double sum = 0;
+  for (const PlacedBody& b : bodies_) sum += b.body->bone.sum() * b.body->bone.frame().voxel_volume_mm3();
+  return sum;
+}
+
+}  // namespace osteo

@@ -1,0 +1,250 @@
+#include "osteo/bone/world.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "bar.h"
+#include "osteo/bone/live_surface.h"
+#include "osteo/bone/plates.h"
+#include "osteo/mesh/mesh_info.h"
+
+namespace osteo {
+namespace {
+
+using test::bar;
+
+const SawCut kMiddle{{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1.0};
+
+TEST(World, SawSplitMoveAndBackToTheBit) {
+  World w(bar(0.5, 0.4));
+  const std::string whole = w.hash();
+  const double volume = w.volume_mm3();
+  EXPECT_FALSE(w.act(SceneAction::split(1)).done);
+  auto sawn = w.act(SceneAction::saw(kMiddle));
+  ASSERT_TRUE(sawn.done);
+  double dust = 0;
+  for (const auto& [v, d] : sawn.dust) dust += static_cast<double>(d) * 0.125;
+  EXPECT_NEAR(dust, 80, 3);
+  EXPECT_NEAR(volume - w.volume_mm3(), dust, 1e-3);
+  const auto split = w.act(SceneAction::split(1));
+  ASSERT_TRUE(split.done);
+  ASSERT_EQ(w.bodies().size(), 2u);
+  EXPECT_NEAR(w.bodies()[0].body->bone.sum() * 0.125, 16.5 * 80, 30);
+  EXPECT_NEAR(w.bodies()[1].body->bone.sum() * 0.125, 12.5 * 80, 30);
+  // Every voxel of the stream has one owner.
+  for (const auto& b : w.bodies()) EXPECT_EQ(w.owner(b.body->name_of(0)), &b);
+  const auto away = rotation_about({5, 1, 2}, normalized({1, 1, 0}), 0.3);
+  ASSERT_TRUE(w.act(SceneAction::move(1, away)).done);
+  EXPECT_NE(w.hash(), whole);
+  EXPECT_EQ(w.undo_steps(), 3u);
+  ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.bodies()[1].world_from_body.rotation, Mat3{});
+  ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.bodies().size(), 1u);
+  ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.hash(), whole);
+  EXPECT_FALSE(w.act(SceneAction::plain(ActionKind::undo)).done);
+}
+
+TEST(World, WhatWasDrilledSinceStaysDrilledWhenTakenBack) {
+  World w(bar(0.5, 0));
+  w.act(SceneAction::saw(kMiddle));
+  w.act(SceneAction::split(1));
+  Body& piece = *w.bodies()[1].body;
+  VoxelKey solid = 0;
+  while (piece.bone.value(solid) < 1) ++solid;
+  const Ijk c = piece.bone.coordinate(solid);
+  piece.bone.set(solid, 0);
+  w.act(SceneAction::plain(ActionKind::undo));
+  w.act(SceneAction::plain(ActionKind::undo));
+  EXPECT_EQ(w.bodies()[0].body->bone.at(c.i, c.j, c.k), 0);
+  EXPECT_NEAR(w.volume_mm3(), bar(0.5, 0).sum() * 0.125 - 0.125, 1e-3);
+}
+
+TEST(World, APieceIsSplitAgainAndSawnWhereItLies) {
+  World w(bar(0.5, 0));
+  w.act(SceneAction::saw(kMiddle));
+  w.act(SceneAction::split(1));
+  // Turned about z by a right angle and moved: its length now lies along y.
+  w.act(SceneAction::move(1, RigidTransform{{}, {0, 40, 0}} * rotation_about({}, {0, 0, 1}, std::numbers::pi / 2)));
+  // x from 2.5 to 15 became y from 42.5 to 55.
+  ASSERT_TRUE(w.act(SceneAction::saw({{0, 48, 0}, {0, 1, 0}, {0, 0, 1}, 1}, 1)).done);
+  const auto split = w.act(SceneAction::split(1));
+  ASSERT_TRUE(split.done);
+  ASSERT_EQ(w.bodies().size(), 3u);
+  EXPECT_EQ(split.made[0].from, 1u);
+  EXPECT_NEAR(w.bodies()[2].body->bone.sum() * 0.125, 5.0 * 80, 20);
+  EXPECT_EQ(w.bodies()[2].world_from_body.shift_mm, w.bodies()[1].world_from_body.shift_mm);
+  while (w.undo_steps() > 0) ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.hash(), World(bar(0.5, 0)).hash());
+}
+
+// What the follower keeps of a piece, made from what it knew of the whole, is what it would be made anew.
+TEST(World, LabelsAndSurfaceOfAPieceEqualNewOnes) {
+  const auto surface_of = [](const BrickGrid& b) { return surface_hash(surface_nets(b).mesh); };
+  for (const double turn : {0.0, 0.6}) {
+    World w(bar(0.25, turn));
+    LiveComponents labels(w.bodies()[0].body->bone);
+    LiveSurface surface(w.bodies()[0].body->bone, {});
+    for (const double x : {-7.0, 6.0}) {
+      const std::shared_ptr<Body> before = w.bodies()[0].body;
+      auto e = w.act(SceneAction::saw({{x, 0, 0}, {1, 0.2, 0}, {0, 0, 1}, 0.8}));
+      const auto follow = [&] {
+        labels.rebind(w.bodies()[0].body->bone);
+        surface.rebind(w.bodies()[0].body->bone);
+        for (const std::uint32_t b : e.changed[0].bricks) {
+          labels.mark_brick(b);
+          surface.mark_brick(b);
+        }
+        labels.update();
+        surface.update();
+      };
+      follow();
+      const std::shared_ptr<Body> sawn = w.bodies()[0].body;
+      e = w.act(SceneAction::split(1), [&](std::uint32_t id) { return id == 0 ? &labels : nullptr; });
+      ASSERT_EQ(e.made.size(), 1u);
+      const BrickGrid& piece = w.find(e.made[0].body)->body->bone;
+      int copied = 0;
+      for (const auto u : e.made[0].origin.unchanged) copied += u;
+      EXPECT_GT(copied, 0);
+      const LiveComponents piece_labels(piece, labels, e.made[0].origin), again(piece);
+      ASSERT_EQ(piece_labels.components().size(), again.components().size());
+      for (VoxelKey v = 0; v < piece.brick_count() * 512; ++v) ASSERT_EQ(piece_labels.component_of(v), again.component_of(v));
+      const LiveSurface piece_surface(piece, surface, e.made[0].origin);
+      EXPECT_EQ(surface_hash(piece_surface.joined().mesh), surface_of(piece));
+      follow();
+      EXPECT_EQ(surface_hash(surface.joined().mesh), surface_of(w.bodies()[0].body->bone));
+      EXPECT_EQ(labels.components().size(), 1u);
+    }
+  }
+}
+
+TEST(World, PlatesJoinPiecesAndADistractorOpens) {
+  World w(bar(0.5, 0));
+  w.act(SceneAction::saw(kMiddle));
+  w.act(SceneAction::split(1));
+  const auto distractor = static_cast<std::uint32_t>(plate_index("distractor")), mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
+  const RigidTransform on_top{{}, {2, 0, 4}};
+  EXPECT_FALSE(w.act(SceneAction::open(1, 5)).done);
+  ASSERT_TRUE(w.act(SceneAction::attach(distractor, on_top, 0, 1)).done);
+  ASSERT_TRUE(w.act(SceneAction::open(1, 7)).done);
+  EXPECT_NEAR(w.bodies()[1].world_from_body.shift_mm.x, 7, 1e-12);
+  ASSERT_TRUE(w.act(SceneAction::open(1, 99)).done);
+  EXPECT_NEAR(w.bodies()[1].world_from_body.shift_mm.x, 20, 1e-12);
+  ASSERT_TRUE(w.act(SceneAction::open(1, 6)).done);
+  // Another plate across the gap holds it; then moving one moves both.
+  ASSERT_TRUE(w.act(SceneAction::attach(mini, RigidTransform{{}, {5, 3, 4}}, 0, 1)).done);
+  const auto stuck = w.act(SceneAction::open(1, 8));
+  EXPECT_FALSE(stuck.done);
+  EXPECT_NE(stuck.message.find("another plate"), std::string::npos);
+  ASSERT_TRUE(w.act(SceneAction::move(1, RigidTransform{{}, {6, 10, 0}})).done);
+  EXPECT_NEAR(w.bodies()[0].world_from_body.shift_mm.y, 10, 1e-12);
+  ASSERT_TRUE(w.act(SceneAction::detach(1)).done);
+  ASSERT_TRUE(w.act(SceneAction::detach(2)).done);
+  ASSERT_TRUE(w.act(SceneAction::move(1, RigidTransform{{}, {6, 20, 0}})).done);
+  EXPECT_NEAR(w.bodies()[0].world_from_body.shift_mm.y, 10, 1e-12);
+  // Undo: the move; the plates come back; and where everything was.
+  for (int i = 0; i < 3; ++i) w.act(SceneAction::plain(ActionKind::undo));
+  EXPECT_EQ(w.fixtures().size(), 2u);
+  while (w.undo_steps() > 0) w.act(SceneAction::plain(ActionKind::undo));
+  EXPECT_EQ(w.hash(), World(bar(0.5, 0)).hash());
+}
+
+TEST(World, RefusesWhatMakesNoSense) {
+  World w(bar(1, 0));
+  const std::string before = w.hash();
+  RigidTransform mirrored;
+  mirrored.rotation.column[0] = {-1, 0, 0};
+  SceneAction nan = SceneAction::open(1, NAN), unknown = SceneAction::plain(ActionKind::undo);
+  unknown.kind = 77;
+  for (const SceneAction& a :
+       {SceneAction::move(5, {}), SceneAction::move(0, mirrored), SceneAction::attach(99, {}, 0), SceneAction::attach(0, {}, 0, 0),
+        SceneAction::attach(0, {}, 0, 9), SceneAction::detach(3), SceneAction::saw({{500, 0, 0}, {1, 0, 0}}), SceneAction::saw({{0, 0, 0}, {0, 0, 0}}),
+        SceneAction::split(1), nan, unknown}) {
+    const auto e = w.act(a);
+    EXPECT_FALSE(e.done) << a.kind;
+    EXPECT_FALSE(e.message.empty());
+  }
+  EXPECT_EQ(w.hash(), before);
+}
+
+TEST(World, CrumbsBecomeDustAndNothingIsLost) {
+  World w(bar(0.5, 0));
+  for (int c = 0; c < 9; ++c) w.act(SceneAction::saw({{-12.0 + 3 * c, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
+  const double sawn = w.volume_mm3();
+  const auto e = w.act(SceneAction::split(165));
+  EXPECT_EQ(w.bodies().size(), 2u);
+  double dust = 0;
+  for (const auto& [v, d] : e.dust) dust += static_cast<double>(d) * 0.125;
+  EXPECT_NEAR(dust, 8 * 160, 40);
+  EXPECT_NEAR(w.volume_mm3() + dust, sawn, 1e-2);
+}
+
+TEST(Plates, AreClosedAndOfTheirSize) {
+  for (const PlateModel& p : plate_library()) {
+    EXPECT_TRUE(is_closed(soup_of(p.mesh))) << p.name;
+    Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
+    for (const auto& q : p.mesh.points_mm)
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], static_cast<double>(q[a]));
+        hi[a] = std::max(hi[a], static_cast<double>(q[a]));
+      }
+    EXPECT_NEAR(lo.z, 0, 0.05) << p.name;
+    if (p.most_opening_mm == 0) {
+      EXPECT_NEAR(hi.z, p.thickness_mm, 0.05) << p.name;
+      EXPECT_NEAR(lo.x + hi.x, 0, 0.02);
+    } else {
+      EXPECT_TRUE(is_closed(soup_of(p.moving)));
+    }
+    for (const int count : {100, 2000}) {
+      const auto samples = sample_plate(p, count, 0.1);
+      EXPECT_NEAR(static_cast<double>(samples.size()), count, 0.15 * count) << p.name;
+      double under = 0, all = 0, flat = 0;
+      Vec3 mean{};
+      for (const auto& s : samples) {
+        all += s.area_mm2;
+        if (s.outwards.z < -0.9) under += s.area_mm2;
+        if (s.outwards.z < -0.9) flat = std::max(flat, std::abs(s.at_mm.z + 0.1));
+        mean += s.outwards * s.area_mm2;
+      }
+      EXPECT_LT(length(mean), 0.15 * all) << p.name;  // a closed surface
+      EXPECT_TRUE(p.most_opening_mm > 0 || flat < 0.12) << p.name;  // but for the rounding of its edges
+      EXPECT_GT(under, 0.15 * all);
+    }
+  }
+}
+
+TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
+  BrickGrid coarse = bar(0.5, 0);
+  Frame f = coarse.frame();
+  // 8 mm: 16 coarse voxels, 40 of 0.2 mm.
+  const Vec3 corner = f.world_from_index({31.5, 31.5, 31.5});
+  f.spacing_mm = {0.2, 0.2, 0.2};
+  f.dims = {40, 40, 40};
+  f.origin_mm = corner + Vec3{0.1, 0.1, 0.1};
+  std::vector<Ijk> bricks;
+  for (int b = 0; b < 125; ++b) bricks.push_back({b % 5, b / 5 % 5, b / 25});
+  BrickGrid fine(f, bricks);
+  for (VoxelKey v = 0; v < 125 * 512; ++v) {
+    const Ijk c = fine.coordinate(v);
+    const Vec3 p = f.world_from_index({double(c.i), double(c.j), double(c.k)});
+    const double d = std::min({15 - std::abs(p.x), 5 - std::abs(p.y), 4 - std::abs(p.z)});
+    fine.set(v, static_cast<float>(std::clamp(d / 0.2 + 0.5, 0.0, 1.0)));
+  }
+  World w(BrickGrid(coarse), nullptr);
+  w.add_region(BrickGrid(fine));
+  EXPECT_NEAR(w.volume_mm3(), coarse.sum() * 0.125, 2);
+  EXPECT_FALSE(w.act(SceneAction::split(1)).done);
+  w.act(SceneAction::move(0, RigidTransform{{}, {1, 2, 3}}));
+  EXPECT_EQ(w.bodies()[1].world_from_body.shift_mm, (Vec3{1, 2, 3}));
+  World bad(BrickGrid(coarse), nullptr);
+  Frame off = f;
+  off.origin_mm.x += 0.13;
+  EXPECT_ANY_THROW(bad.add_region(BrickGrid(off, bricks)));
+}
+
+}  // namespace
+}  // namespace osteo
