@@ -288,7 +288,7 @@ void bench_kernel(const Context& context) {
           goal.tool = 5;
           const DeviceSample sample = hand.step(goal, 1e-3, force);
           const auto begin = std::chrono::steady_clock::now();
-          const auto step = renderer.step(bone, sample);
+          const auto step = renderer.step(sample);
           us.add(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e6);
           force = {step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
           voxels.add(step.record.immersed);
@@ -445,7 +445,7 @@ void bench_real_time() {
       const auto path = std::filesystem::temp_directory_path() / "osteo-bench-session.oss";
       std::filesystem::remove(path);
       Recorder recorder(stream.add_reader(), path, {});
-      Servo servo(bone, renderer, device, stream, hz);
+      Servo servo(renderer, device, stream, hz);
       FixedRateLoop loop(hz, [&](std::int64_t late) { return servo.step(late); });
       recorder.start();
       loop.start();
@@ -546,7 +546,7 @@ void bench_haptics_fuzz(const Context&) {
       if (dice == 500) s.position_mm[random() % 3] = NAN;
       if (dice == 501) s.axis[random() % 3] = INFINITY;
       if (dice == 502) s.position_mm[random() % 3] = 1e30F;
-      const auto step = renderer->step(bone, s);
+      const auto step = renderer->step(s);
       const Vec3 f{step.record.force_n[0], step.record.force_n[1], step.record.force_n[2]};
       bad += std::isfinite(length(f)) ? 0 : 1;
       over += length(f) > 3.3 * (1 + 1e-6) ? 1 : 0;

@@ -100,7 +100,7 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     script.axis = {0.6, 0, 0.8};
     for (int i = 0; i <= 40; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 4 - 0.2 * i}, i % 5 != 0});
     ScriptedDevice device(script, 1000);
-    ::osteo::Servo servo(bone, renderer, device, stream, 1000);
+    ::osteo::Servo servo(renderer, device, stream, 1000);
     offences = 0;
     watched = true;
     while (servo.step(0)) {

@@ -57,7 +57,7 @@ inline double drilled_mm3(ContactMethod method, double h, double rate_hz, int to
     goal.axis = {0.6F, 0, 0.8F};
     goal.drill_on = 1;
     goal.tool = static_cast<std::uint8_t>(tool);
-    const auto [record, changes] = renderer.step(bone, hand.step(goal, 1 / rate_hz, force));
+    const auto [record, changes] = renderer.step(hand.step(goal, 1 / rate_hz, force));
     force = {record.force_n[0], record.force_n[1], record.force_n[2]};
     removed += static_cast<double>(record.removed_mm3);
   }

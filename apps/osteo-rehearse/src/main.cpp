@@ -125,8 +125,7 @@ struct WindowCommand {
     std::filesystem::path next_folder = p.out, resume_from = p.resume;
     RehearsalOptions options;
     options.rate_hz = p.rate_hz;
-    options.follow_pieces = true;
-    options.dust = p.dust;
+    options.follow = {true, true, p.dust};
     const Hands hands(p.device, p.arm);
     options.haptics.params.contact.method = p.contact;
     apply_haptic_settings(the_case.folder, p.settings, options.haptics);
@@ -137,12 +136,12 @@ struct WindowCommand {
       session = create_session_folder(std::exchange(next_folder, {}), the_case.folder, from);
       options.session_file = session.stream();
       rehearsal.reset();
-      BrickGrid bone = bone_at_begin(session);
+      options.anatomy = anatomy_of(the_case, options.haptics, io.context);
+      World world = world_at_begin(session, the_case, options.anatomy);
       // In front of the bone on the patient's left, where the window looks.
-      auto device = hands.make(in_front_of(bone, tool), tool);
+      auto device = hands.make(in_front_of(world.bodies().front().body->bone, tool), tool);
       options.haptics.device = device->traits();
-      options.anatomy = anatomy_of(the_case, bone, options.haptics, io.context);
-      rehearsal = std::make_unique<Rehearsal>(std::move(bone), std::move(device), options, io.context);
+      rehearsal = std::make_unique<Rehearsal>(std::move(world), std::move(device), options, io.context);
       rehearsal->start();
     };
     actions.save = [&] {

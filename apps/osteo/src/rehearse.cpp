@@ -11,6 +11,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/bone/live_components.h"
+#include "osteo/bone/world_mesh.h"
 #include "osteo/cli/report.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
@@ -20,7 +21,7 @@
 #include "osteo/session/export.h"
 #include "osteo/session/haptic_settings.h"
 #include "osteo/session/script_file.h"
-#include "osteo/view/snapshot.h"
+#include "osteo/view/world_view.h"
 
 namespace osteo {
 namespace {
@@ -75,8 +76,15 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.headless) return open_window(p, io);
   const Case the_case = load_case(io.arguments[0]);
   io.context.progress(0, "loading");
-  BrickGrid bone = p.resume.empty() ? to_bricks(the_case.bone) : bone_at_end(open_session_folder(p.resume, the_case.folder));
-  const Script script = p.script.empty() ? make_default_script(bone, p.side == Side::left, tool, p.seconds) : load_script(p.script);
+  RehearsalOptions options;
+  options.haptics.params.contact.method = p.contact;
+  options.haptics.device = SpringHand::traits();
+  apply_haptic_settings(the_case.folder, p.settings, options.haptics);
+  options.anatomy = anatomy_of(the_case, options.haptics, io.context);
+  World world = p.resume.empty() ? world_of(the_case, options.anatomy)
+                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy);
+  const Script script = p.script.empty() ? make_default_script(world.bodies().front().body->bone, p.side == Side::left, tool, p.seconds)
+                                         : load_script(p.script);
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
 
@@ -84,25 +92,20 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   Vec3 site{};
   for (const auto& w : script.waypoints) site += w.at_mm / static_cast<double>(script.waypoints.size());
   const Vec3 eye = normalized(script.axis + Vec3{0, -0.2, 0.15});
-  const auto draw = [&](const BrickGrid& b, const char* name) {
-    const TriMesh mesh = surface_nets(b, 0.5F, io.context).mesh;
-    save_picture(draw_surface(mesh, site, 32, eye, 900, 700), folder / name);
-    return mesh;
-  };
-  draw(bone, "before.png");
-  write_file(folder / "strokes.json", script_json(script));
+  const Script::Camera camera = script.camera.value_or(Script::Camera{site, 32, eye});
+  const WorldPicture view{camera.centre_mm, camera.radius_mm, camera.eye, 900, 700};
+  write_file(folder / "strokes.json", p.script.empty() ? script_json(script) : read_text(p.script));
 
-  RehearsalOptions options;
   options.rate_hz = p.rate_hz;
   options.session_file = session.stream();
-  options.follow_pieces = p.pieces;
-  options.dust = p.dust;
+  options.follow = {true, p.pieces, p.dust};
+  options.actions = actions_of(script, p.rate_hz);
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
-  options.haptics.device = device->traits();
-  options.haptics.params.contact.method = p.contact;
-  apply_haptic_settings(the_case.folder, p.settings, options.haptics);
-  options.anatomy = anatomy_of(the_case, bone, options.haptics, io.context);
-  Rehearsal rehearsal(std::move(bone), std::move(device), options, io.context);
+  Rehearsal rehearsal(std::move(world), std::move(device), options, io.context);
+  const auto draw = [&](const char* name) {
+    rehearsal.look([&](const World& w, Follower& f) { save_picture(draw_world(w, f, rehearsal.structures(), view), folder / name); });
+  };
+  draw("before.png");
   RehearsalSummary s;
   if (p.fast) {
     s = rehearsal.run_to_end(io.context);
@@ -120,7 +123,10 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     }
     s = rehearsal.stop();
   }
-  const TriMesh after = draw(rehearsal.bone(), "after.png");
+  if (const std::string refused = rehearsal.take_refusal(); !refused.empty()) io.context.warn("an action could not be done: " + refused);
+  TriMesh after;
+  draw("after.png");
+  rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
   save_surface(after, folder / "surface.ply");
 
   const std::string summary =
@@ -155,27 +161,28 @@ cli::CommandInfo ReplayCommand::info() {
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const Session session = read_session(folder.stream());
-  BrickGrid bone = bone_at_begin(folder);
+  const Case the_case = load_case(folder.case_folder);
   HapticSetup setup = session.header.haptics;
-  const ReplayResult r = replay(session, bone, anatomy_of(load_case(folder.case_folder), bone, setup, io.context), io.context);
+  const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
+  const ReplayResult r = replay(session, world_at_begin(folder, the_case, anatomy), anatomy, io.context);
   if (!p.surface_out.empty()) {
     if (fs::exists(p.surface_out) && !io.common.force)
       throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");
-    save_surface(surface_nets(bone, 0.5F, io.context).mesh, p.surface_out);
+    save_surface(surface_of(*r.world, io.context), p.surface_out);
   }
   if (!p.bone_out.empty()) {
     if (fs::exists(p.bone_out) && !io.common.force)
       throw Error(ExitCode::cannot_write, "'" + p.bone_out + "' exists already", "--force replaces it");
-    save_grid(to_sparse(bone, "density"), p.bone_out);
+    save_grid(to_sparse(r.world->bodies().front().body->bone, "density"), p.bone_out);
   }
   io.end_progress();
-  ordered_json j{{"ticks", r.ticks},         {"identical", r.identical},       {"complete", r.complete},
-                 {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash}, {"removed_mm3", r.removed_mm3},
-                 {"seconds", r.seconds}};
+  ordered_json j{{"ticks", r.ticks},         {"actions", r.actions},         {"identical", r.identical},
+                 {"complete", r.complete},   {"bone_hash", r.bone_hash},     {"surface_hash", r.surface_hash},
+                 {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
   if (!io.common.quiet) {
-    io.err << "replayed " << r.ticks << " ticks in " << format_number(std::round(r.seconds * 100) / 100)
+    io.err << "replayed " << r.ticks << " ticks and " << r.actions << " actions in " << format_number(std::round(r.seconds * 100) / 100)
            << " s: " << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference)
            << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
@@ -240,7 +247,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   Anatomy anatomy;
   if (setup.hardness || the_case.files.contains("structures")) {
     timed("hardness and structures at risk", "nobody: they do not change", [&] {
-      anatomy = anatomy_of(the_case, bone, setup, io.context);
+      anatomy = anatomy_of(the_case, setup, io.context);
       return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
     });
   }
@@ -269,7 +276,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   for (std::uint64_t t = 0; device.active(t); ++t) {
     const DeviceSample sample = device.read(t, 1e-3, force);
     const std::int64_t begin = monotonic_ns();
-    const auto [record, changes] = renderer->step(bone, sample);
+    const auto [record, changes] = renderer->step(sample);
     ticks.add(monotonic_ns() - begin);
     force = from_floats(record.force_n);
   }

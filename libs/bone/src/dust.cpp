@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/base/files.h"
+
 namespace osteo {
 namespace {
 
@@ -52,14 +54,27 @@ void Dust::wake(Ijk c) {
       }
 }
 
-void Dust::add(VoxelKey voxel, double mm3) {
+void Dust::add_at(Vec3 world_mm, double mm3) {
+  const Vec3 x = bone_.frame().index_from_world(world_mm);
+  add(Ijk{static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z))}, mm3);
+}
+
+void Dust::bone_changed(std::uint32_t brick) {
+  const Ijk o = bone_.brick_coordinate(brick);
+  for (int n = 0; n < 8; ++n) wake({o.i * 8 + (n & 1) * 7, o.j * 8 + (n >> 1 & 1) * 7, o.k * 8 + (n >> 2) * 7});
+}
+
+void Dust::add(Ijk c, double mm3) {
   const double units = mm3 / bone_.frame().voxel_volume_mm3() * kUnitsAVoxel + carry_;
   const auto whole = static_cast<std::uint32_t>(std::clamp(units, 0.0, 4e9));
   carry_ = units - whole;
   if (whole == 0) return;
-  const Ijk c = bone_.coordinate(voxel);
-  *cell(c, true) += whole;
   added_ += whole;
+  if (!in_reach(c)) {
+    fallen_ += whole;
+    return;
+  }
+  *cell(c, true) += whole;
   wake(c);
 }
 
@@ -298,6 +313,15 @@ Dust::Totals Dust::totals() const {
     for (const std::uint32_t u : b->units) present += u;
   return {static_cast<double>(added_) * unit, static_cast<double>(present) * unit, static_cast<double>(sucked_) * unit,
           static_cast<double>(washed_) * unit, static_cast<double>(fallen_) * unit};
+}
+
+std::string Dust::hash() const {
+  Hasher h;
+  visit([&](Vec3 at, double full) {
+    h.add(&at, sizeof at);
+    h.add(&full, sizeof full);
+  });
+  return h.hex();
 }
 
 void Dust::visit(const std::function<void(Vec3, double)>& f) const {

@@ -13,4 +13,13 @@ RigidTransform rotation_about(Vec3 point, Vec3 axis, double angle) {
   return r;
 }
 
+Mat3 frame_of_axis(Vec3 axis) {
+  // R. Rodrigues: c = cosine, v = z x axis, R = 1 + [v] + [v]^2 / (1 + c).
+  const double c = axis.z;
+  if (c < -1 + 1e-12) return {{Vec3{1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, -1}}};
+  const Vec3 v{-axis.y, axis.x, 0};
+  const double k = 1 / (1 + c);
+  return {{Vec3{1 - v.y * v.y * k, v.x * v.y * k, -v.y}, Vec3{v.x * v.y * k, 1 - v.x * v.x * k, v.x}, Vec3{v.y, -v.x, c}}};
+}
+
 }  // namespace osteo

@@ -54,8 +54,10 @@ SceneAction SceneAction::move(std::uint32_t body, const RigidTransform& world_fr
   return a;
 }
 
-SceneAction SceneAction::grip(const RigidTransform& hand_from_plate) {
-  return with_transform(ActionKind::grip, hand_from_plate);
+SceneAction SceneAction::grip(std::uint32_t plate, const RigidTransform& hand_from_plate) {
+  SceneAction a = with_transform(ActionKind::grip, hand_from_plate);
+  a.item = plate;
+  return a;
 }
 
 SceneAction SceneAction::attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other) {

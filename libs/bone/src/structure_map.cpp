@@ -7,6 +7,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/distance/mask_distance.h"
+#include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
 
@@ -52,6 +53,23 @@ StructureMap::Answer StructureMap::at(Vec3 world_mm) const noexcept {
     }
   }
   return {reach_mm_ - closeness, structure};
+}
+
+std::pair<TriMesh, std::vector<std::uint8_t>> StructureMap::surface(const Context& context) const {
+  TriMesh mesh = surface_nets(closeness_, static_cast<float>(reach_mm_), context).mesh;
+  std::vector<std::uint8_t> whose;
+  whose.reserve(mesh.points_mm.size());
+  for (const auto& p : mesh.points_mm) whose.push_back(at(from_floats(p)).structure);
+  return {std::move(mesh), std::move(whose)};
+}
+
+std::array<double, 3> StructureMap::colour_of(std::uint8_t structure) const {
+  for (const Structure& s : structures_) {
+    if (s.value == structure && s.rgb != std::array<std::uint8_t, 3>{}) return {s.rgb[0] / 255.0, s.rgb[1] / 255.0, s.rgb[2] / 255.0};
+  }
+  static constexpr std::array<std::array<double, 3>, 6> kRow{
+      {{0.95, 0.85, 0.25}, {0.30, 0.45, 0.90}, {0.85, 0.25, 0.25}, {0.35, 0.75, 0.45}, {0.80, 0.45, 0.80}, {0.30, 0.75, 0.80}}};
+  return kRow[(structure + 5U) % kRow.size()];
 }
 
 StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis) const noexcept {

@@ -38,6 +38,13 @@ World::World(BrickGrid bone, std::shared_ptr<const Hardness> hardness) {
   bodies_.push_back({std::move(body), {}, false});
 }
 
+World World::copy() const {
+  World w(*this);
+  for (PlacedBody& b : w.bodies_)
+    b.body = std::make_shared<Body>(Body{b.body->id, b.body->first_brick, BrickGrid(b.body->bone), b.body->hardness});
+  return w;
+}
+
 void World::add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness) {
   Body& coarse = *bodies_.front().body;
   const Frame& c = coarse.bone.frame();
@@ -157,6 +164,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::grip:
       held_ = was_held;
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
+      if (a.item != SceneAction::kNobody && a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));
+      plate_ = a.item;
       grip_ = a.transform();
       break;
     case ActionKind::move: {
@@ -182,6 +191,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       f.other = a.other;
       f.body_from_plate = find(a.body)->world_from_body.inverse() * a.transform();
       fixtures_.push_back(f);
+      plate_ = SceneAction::kNobody;
       break;
     }
     case ActionKind::detach:
@@ -223,7 +233,8 @@ World::Effect World::saw(const SceneAction& a) {
     own.at_mm = back(cut.at_mm);
     own.normal = back.rotation * cut.normal;
     own.along = back.rotation * cut.along;
-    auto sawn = std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, BrickGrid(placed.body->bone), placed.body->hardness});
+    auto sawn =
+        std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, BrickGrid(placed.body->bone), placed.body->hardness});
     std::vector<VoxelKey> changed;
     apply_saw(sawn->bone, own, changed);
     if (changed.empty()) continue;
@@ -270,8 +281,8 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
       effect.dust.emplace_back(placed.body->name_of(voxel), density);
     }
     effect.changed.push_back({placed.body->id, std::move(split.changed_bricks)});
-    bodies.back().body = std::make_shared<Body>(
-        Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
+    bodies.back().body =
+        std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
     for (std::size_t p = 1; p < split.pieces.size(); ++p) {
       Piece& piece = split.pieces[p];
       auto body = std::make_shared<Body>(Body{next_body_++, next_brick_, std::move(piece.bone), nullptr});

@@ -29,6 +29,7 @@ class ExactOverlap final : public ContactModel {
   ExactOverlap(const ContactParams& params, double spacing_mm);
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
+  [[nodiscard]] const OverlapResult* overlapped() const noexcept override { return &last_; }
 
  private:
   ContactParams params_;
@@ -39,6 +40,10 @@ class ExactOverlap final : public ContactModel {
   bool cutting_ = false;
   std::uint32_t phase_ = 0;
 };
+
+/// The law of ExactOverlap; all but what was immersed.
+[[nodiscard]] ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, const OverlapResult& overlap,
+                                               Vec3 axis) noexcept;
 
 /// The share of a flat cut's push that is left when parts of the surface push against each other: 1 on flat bone, 0 between two walls.
 [[nodiscard]] inline double push_left(const OverlapResult& o, double depth_mm, const RoundCone& shape) {

@@ -56,17 +56,23 @@ ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& p
   if (!finite(at)) return r;
   const std::size_t tool = tool_of(pose);
   last_ = overlap_.measure(bone, heads_[tool], at, axis, cutting_, falloff_share(burr_library()[tool]), strides_[tool], phase_++);
-  r.bone_mm3 = last_.bone_mm3;
+  r = contact_of_overlap(params_, tool, last_, axis);
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(last_.bone_mm3 / bone.frame().voxel_volume_mm3())));
-  const double pressed = length(last_.area_mm2);
-  if (!(last_.bone_mm3 > 0) || !(pressed > 0)) return r;
-  r.normal = last_.area_mm2 * (-1 / pressed);
+  return r;
+}
+
+ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, const OverlapResult& overlap, Vec3 axis) noexcept {
+  ContactResult r;
+  r.bone_mm3 = overlap.bone_mm3;
+  const double pressed = length(overlap.area_mm2);
+  if (!(overlap.bone_mm3 > 0) || !(pressed > 0)) return r;
+  r.normal = overlap.area_mm2 * (-1 / pressed);
   const double cosine = -dot(r.normal, axis);
-  r.depth_mm = head_cut_depth(tool)(last_.sharp_mm3, cosine);
-  const double left = push_left(last_, r.depth_mm, heads_[tool]);
-  r.normal_force_n = left * params_.force_n(r.depth_mm);
+  r.depth_mm = head_cut_depth(tool)(overlap.sharp_mm3, cosine);
+  const double left = push_left(overlap, r.depth_mm, burr_library()[tool].head());
+  r.normal_force_n = left * params.force_n(r.depth_mm);
   r.force_n = r.normal * r.normal_force_n;
-  r.torque_n_mm = cross(axis, last_.area_foot_mm3) * (-r.normal_force_n / pressed);
+  r.torque_n_mm = cross(axis, overlap.area_foot_mm3) * (-r.normal_force_n / pressed);
   // Where a rigid tool would be: the hand's depth back along the push.
   r.shown_offset_mm = r.normal * (r.depth_mm * left);
   return r;

@@ -14,63 +14,189 @@ constexpr double kEscapeFrom = 0.6, kEscapeAll = 0.9;
 constexpr double kFarthestMm = 1e6;  // no pose of a hand: broken, as is what is not a number
 constexpr int kMapBudget = 48;       // blocks of the distance map a tick, 5 us
 
-HapticsParams made_safe(HapticsParams p, const DeviceTraits& device, double dt_s) {
-  const double most = safe_stiffness_n_per_mm(device, p.guard.contact_damping_n_s_per_m, dt_s);
+HapticSetup made_safe(HapticSetup setup, double dt_s) {
+  HapticsParams& p = setup.params;
+  const double most = safe_stiffness_n_per_mm(setup.device, p.guard.contact_damping_n_s_per_m, dt_s);
   p.contact.stiffness_n_per_mm = std::min(p.contact.stiffness_n_per_mm, most);
   p.contact.soft_stiffness_n_per_mm = std::min(p.contact.soft_stiffness_n_per_mm, most);
-  return p;
+  return setup;
+}
+
+OverlapResult turned(const OverlapResult& o, const Mat3& r) {
+  OverlapResult t = o;
+  t.area_mm2 = r * o.area_mm2;
+  t.area_foot_mm3 = r * o.area_foot_mm3;
+  return t;
+}
+void add(OverlapResult& sum, const OverlapResult& o) {
+  sum.bone_mm3 += o.bone_mm3;
+  sum.sharp_mm3 += o.sharp_mm3;
+  sum.area_mm2 += o.area_mm2;
+  sum.surface_mm2 += o.surface_mm2;
+  sum.area_foot_mm3 += o.area_foot_mm3;
 }
 
 }  // namespace
 
-HapticRenderer::HapticRenderer(const HapticSetup& setup, const BrickGrid& bone, const Anatomy& anatomy, double dt_s)
-    : params_(made_safe(setup.params, setup.device, dt_s)),
+HapticRenderer::HapticRenderer(const HapticSetup& setup, const Anatomy& anatomy, double dt_s)
+    : setup_(made_safe(setup, dt_s)),
       anatomy_(anatomy),
       dt_s_(dt_s),
-      removal_(most_hits(bone.frame().spacing_mm.x)),
       vibration_(setup.vibration_json.empty() ? default_vibration() : parse_vibration(setup.vibration_json, "the session's vibration")),
-      guard_(params_.guard, setup.device) {
-  method_of_tool_.assign(burr_library().size(), params_.contact.method);
-  for (const auto& [tool, method] : setup.tool_methods) {
-    if (tool >= 0 && tool < static_cast<int>(method_of_tool_.size())) method_of_tool_[static_cast<std::size_t>(tool)] = method;
-  }
-  for (const ContactMethod method : method_of_tool_) {
-    auto& model = models_[static_cast<std::size_t>(method)];
-    if (model) continue;
-    ContactParams p = params_.contact;
-    p.method = method;
-    model = make_contact_model(p, bone.frame().spacing_mm.x);
-  }
-  if (params_.effects.fail_safe) {
-    depth_map_ = std::make_unique<DepthMap>(bone);
-    changed_.resize(most_hits(bone.frame().spacing_mm.x));
-  }
-  if (params_.effects.shaft) static_cast<void>(shaft_cut_depth(0));  // not in the servo
+      guard_(setup_.params.guard, setup.device) {
   if (setup.curve.size() >= 2) {
     curve_.emplace(setup.curve);
     constraint_.emplace(*curve_, setup.curve_params);
   }
 }
 
+HapticRenderer::HapticRenderer(const HapticSetup& setup, BrickGrid& bone, const Anatomy& anatomy, double dt_s)
+    : HapticRenderer(setup, anatomy, dt_s) {
+  own_.items.push_back({std::make_shared<TouchedBone>(setup_, bone, anatomy.hardness), {}, {}});
+  own_.make_room();
+  scene_ = &own_;
+}
+
 HapticRenderer::~HapticRenderer() = default;
 
-void HapticRenderer::escape(Vec3 at_mm, const Burr& burr) noexcept {
+// The head in each body near it.
+void HapticRenderer::touch(const DeviceSample& pose) noexcept {
+  const Burr& burr = burr_library()[pose.tool];
   const RoundCone head = burr.head();
-  const double full = contact_.bone_mm3 / head.volume_mm3();
+  const double reach = head.length_mm + head.largest_radius_mm() + 2;  // and where a proxy may be
+  for (HapticScene::Item& item : scene_->items) {
+    TouchedBone& bone = *item.bone;
+    ContactModel* const model = bone.models_[static_cast<std::size_t>(bone.method_of_tool_[pose.tool])].get();
+    if (bone.model_ != nullptr && model != bone.model_) bone.model_->rest();
+    bone.model_ = model;
+    const Vec3 at = item.body_from_world(position_of(pose));
+    // A body alone is always asked: it may be nowhere near, but what its proxy remembers has to follow.
+    if (touched_count_ == kMostTouched || (scene_->items.size() > 1 && !bone.near(at, reach))) {
+      model->rest();
+      continue;
+    }
+    DeviceSample own = pose;
+    own.position_mm = to_floats(at);
+    own.axis = to_floats(item.body_from_world.rotation * axis_of(pose));
+    Touch& t = touched_[touched_count_++];
+    t = {&item, model->contact(bone.bone_, own)};
+    const Mat3& turn = item.world_from_body.rotation;
+    for (Vec3* const v : {&t.contact.force_n, &t.contact.torque_n_mm, &t.contact.normal, &t.contact.shown_offset_mm}) *v = turn * *v;
+  }
+}
+
+// One contact of several.
+void HapticRenderer::combine(Vec3 axis) noexcept {
+  std::size_t in_bone = 0, most = 0;
+  for (std::size_t i = 0; i < touched_count_; ++i) {
+    in_bone += touched_[i].contact.bone_mm3 > 0 ? 1 : 0;
+    if (touched_[i].contact.bone_mm3 > touched_[most].contact.bone_mm3) most = i;
+  }
+  if (touched_count_ == 0) return;
+  loaded_ = touched_[most].item->bone.get();
+  contact_ = touched_[most].contact;
+  if (in_bone < 2) return;
+  OverlapResult sum;
+  bool may_add = true;
+  std::uint32_t immersed = 0;
+  Vec3 force{}, torque{};
+  double bone_mm3 = 0;
+  for (std::size_t i = 0; i < touched_count_; ++i) {
+    const Touch& t = touched_[i];
+    const OverlapResult* const o = t.item->bone->model_->overlapped();
+    may_add = may_add && o != nullptr;
+    if (may_add) add(sum, turned(*o, t.item->world_from_body.rotation));
+    immersed += t.contact.immersed;
+    force += t.contact.force_n;
+    torque += t.contact.torque_n_mm;
+    bone_mm3 += t.contact.bone_mm3;
+  }
+  if (may_add) {
+    contact_ = contact_of_overlap(setup_.params.contact, last_good_.tool, sum, axis);
+  } else {
+    contact_.force_n = force;
+    contact_.torque_n_mm = torque;
+    contact_.bone_mm3 = bone_mm3;
+    contact_.normal = normalized(force);
+    contact_.normal_force_n = length(force);
+  }
+  contact_.immersed = immersed;
+}
+
+void HapticRenderer::escape(Vec3 at_mm, double radius_mm, double full_mm3) noexcept {
+  const double full = contact_.bone_mm3 / full_mm3;
   const double share = std::clamp((full - kEscapeFrom) / (kEscapeAll - kEscapeFrom), 0.0, 1.0);
-  if (share <= 0 || method_of_tool_[last_good_.tool] == ContactMethod::proxy) return;
-  const DepthMap::Answer out = depth_map_->at(at_mm);
+  if (share <= 0 || loaded_ == nullptr || !loaded_->depth_map_) return;
+  const auto item = std::find_if(scene_->items.begin(), scene_->items.end(), [&](const auto& i) { return i.bone.get() == loaded_; });
+  DepthMap::Answer out = loaded_->depth_map_->at(item->body_from_world(at_mm));
   if (out.outwards == Vec3{}) return;
-  const double law = params_.contact.force_n(out.depth_mm + head.largest_radius_mm());
+  out.outwards = item->world_from_body.rotation * out.outwards;
+  const double law = setup_.params.contact.force_n(out.depth_mm + radius_mm);
   contact_.force_n = contact_.force_n * (1 - share) + out.outwards * (law * share);
   contact_.normal = normalized(contact_.normal * (1 - share) + out.outwards * share);
-  contact_.shown_offset_mm = contact_.shown_offset_mm * (1 - share) + out.outwards * (share * (out.depth_mm + head.largest_radius_mm()));
+  contact_.shown_offset_mm = contact_.shown_offset_mm * (1 - share) + out.outwards * (share * (out.depth_mm + radius_mm));
   contact_.normal_force_n = std::max(0.0, dot(contact_.force_n, contact_.normal));
-  contact_.depth_mm = std::max(contact_.depth_mm, share * (out.depth_mm + head.largest_radius_mm()));
+  contact_.depth_mm = std::max(contact_.depth_mm, share * (out.depth_mm + radius_mm));
   flags_ |= kEscape;
 }
 
-HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& sample) noexcept {
+void HapticRenderer::shaft(Vec3 at, Vec3 axis, Vec3& elastic, Vec3& torque) noexcept {
+  const RoundCone shape = burr_library()[last_good_.tool].shaft();
+  OverlapResult o;
+  for (const HapticScene::Item& item : scene_->items) {
+    TouchedBone& bone = *item.bone;
+    const Vec3 own = item.body_from_world(at), own_axis = item.body_from_world.rotation * axis;
+    if (scene_->items.size() > 1 &&
+        !bone.near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm), 0.5 * shape.length_mm + shape.largest_radius_mm() + 1))
+      continue;
+    add(o, turned(bone.shaft_.measure(bone.bone_, shape, own, own_axis), item.world_from_body.rotation));
+  }
+  const double pressed = length(o.area_mm2);
+  if (!(pressed > 0)) return;
+  const Vec3 normal = o.area_mm2 * (-1 / pressed);
+  const double depth = shaft_cut_depth(last_good_.tool)(o.sharp_mm3, -dot(normal, axis));
+  const double push = push_left(o, depth, shape) * setup_.params.contact.force_n(depth);
+  elastic += normal * push;
+  torque += cross(axis, o.area_foot_mm3) * (-push / pressed);
+  if (push > 0) flags_ |= kShaftContact;
+}
+
+// Under the deepest point of the head.
+double HapticRenderer::thickness(Vec3 at, Vec3 axis) const noexcept {
+  const auto item = std::find_if(scene_->items.begin(), scene_->items.end(), [&](const auto& i) { return i.bone.get() == loaded_; });
+  const BrickGrid& bone = loaded_->bone_;
+  const RoundCone head = burr_library()[last_good_.tool].head();
+  const Vec3 away = contact_.normal;
+  const double foot = dot(away, axis) < 0 ? head.length_mm : 0;
+  const Vec3 deepest = at + contact_.shown_offset_mm + axis * foot - away * head.radius_at_mm(foot);
+  const RigidTransform& own = item->body_from_world;
+  return thickness_mm(bone, own(deepest + away * bone.frame().spacing_mm.x), own.rotation * -away);
+}
+
+std::span<const VoxelChange> HapticRenderer::remove(double& removed_mm3) noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < touched_count_; ++i) {
+    Touch& t = touched_[i];
+    TouchedBone& bone = *t.item->bone;
+    // What presses into this body: its share of what the burr is in.
+    const double share = contact_.bone_mm3 > 0 ? t.contact.bone_mm3 / contact_.bone_mm3 : 1;
+    double removed = 0;
+    const auto changes = bone.removal_.remove(bone.bone_, bone.model_->cut(bone.bone_), burr_library()[last_good_.tool],
+                                              touched_count_ == 1 ? contact_.normal_force_n : share * contact_.normal_force_n,
+                                              setup_.params.effects.speed_rpm, dt_s_, bone.hardness_.get(), removed);
+    removed_mm3 += removed;
+    const VoxelKey first = bone.body_ ? bone.body_->name_of(0) : 0;
+    for (const VoxelChange& c : changes) scene_->changes[count++] = {c.voxel + first, c.density};
+    if (bone.depth_map_) {
+      const std::size_t n = std::min(changes.size(), bone.changed_.size());
+      for (std::size_t c = 0; c < n; ++c) bone.changed_[c] = changes[c].voxel;
+      bone.depth_map_->update(bone.bone_, {bone.changed_.data(), n}, 0);
+    }
+  }
+  return {scene_->changes.data(), count};
+}
+
+HapticRenderer::Step HapticRenderer::step(const DeviceSample& sample) noexcept {
   Step result;
   flags_ = 0;
   DeviceSample pose = sample;
@@ -84,42 +210,41 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
     pose.axis = last_good_.axis;
     pose.drill_on = 0;
     in.age_ms = 255;  // as if the device had gone silent
-  } else if (has_last_ && length(position_of(sample) - position_of(last_good_)) > params_.guard.jump_mm) {
+  } else if (has_last_ && length(position_of(sample) - position_of(last_good_)) > setup_.params.guard.jump_mm) {
     jumped = true;
   }
-  if (sample.age_ms > params_.guard.stale_ms) pose.drill_on = 0;
+  const EffectParams& with = setup_.params.effects;
+  if (sample.age_ms > setup_.params.guard.stale_ms || scene_->plate) pose.drill_on = 0;
   const bool usable = has_last_ || (flags_ & kPoseInvalid) == 0;
   if ((flags_ & kPoseInvalid) == 0) {
     last_good_ = pose;
     has_last_ = true;
   }
+  last_good_.tool = pose.tool;
   const Vec3 at = position_of(pose), axis = axis_of(pose);
   const Burr& burr = burr_library()[pose.tool];
-  ContactModel* const model = models_[static_cast<std::size_t>(method_of_tool_[pose.tool])].get();
-  if (model_ != nullptr && model != model_) model_->rest();
-  model_ = model;
-  contact_ = usable ? model_->contact(bone, pose) : ContactResult{};
-  if (depth_map_ && contact_.bone_mm3 > 0) escape(at, burr);
+  contact_ = {};
+  touched_count_ = 0;
+  loaded_ = nullptr;
+  if (scene_->plate && usable) {
+    flags_ |= kPlateInHand;
+    contact_ = plate_contact(*scene_->plate, plate_pose(at, axis, scene_->grip), scene_->items, setup_.params.contact);
+  } else if (usable) {
+    touch(pose);
+    combine(axis);
+    const RoundCone head = burr.head();
+    const bool proxy = loaded_ != nullptr && loaded_->method_of_tool_[pose.tool] == ContactMethod::proxy;
+    if (contact_.bone_mm3 > 0 && !proxy) escape(at, head.largest_radius_mm(), head.volume_mm3());
+  }
 
   Vec3 elastic = contact_.force_n, torque = contact_.torque_n_mm;
-  if (params_.effects.shaft && usable) {
-    const RoundCone shape = burr.shaft();
-    const OverlapResult o = shaft_.measure(bone, shape, at, axis);
-    if (const double pressed = length(o.area_mm2); pressed > 0) {
-      const Vec3 normal = o.area_mm2 * (-1 / pressed);
-      const double depth = shaft_cut_depth(pose.tool)(o.sharp_mm3, -dot(normal, axis));
-      const double push = push_left(o, depth, shape) * params_.contact.force_n(depth);
-      elastic += normal * push;
-      torque += cross(axis, o.area_foot_mm3) * (-push / pressed);
-      if (push > 0) flags_ |= kShaftContact;
-    }
-  }
+  if (with.shaft && usable && !scene_->plate) shaft(at, axis, elastic, torque);
   Vec3 effects{};
   if (pose.drill_on != 0 && usable) {
-    const double running = params_.effects.speed_rpm > 0 ? 1 : 0;
-    const double turn = params_.effects.left_handed ? -1 : 1;
-    effects += cross(contact_.normal, axis) * (turn * running * params_.effects.drag * contact_.normal_force_n);
-    if (params_.effects.vibration && running > 0) {
+    const double running = with.speed_rpm > 0 ? 1 : 0;
+    const double turn = with.left_handed ? -1 : 1;
+    effects += cross(contact_.normal, axis) * (turn * running * with.drag * contact_.normal_force_n);
+    if (with.vibration && running > 0) {
       const auto v = vibration_.step(burr.kind, contact_.normal_force_n, dt_s_);
       const Vec3 u = any_perpendicular(axis);
       effects += u * v[0] + cross(axis, u) * v[1];
@@ -141,16 +266,11 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   const Guard::Output out = guard_.limit(in, dt_s_);
 
   TickRecord& r = result.record;
-  if (usable && contact_.normal_force_n > 0) {
-    // Under the deepest point of the head.
-    const RoundCone head = burr.head();
-    const Vec3 away = contact_.normal;
-    const double foot = dot(away, axis) < 0 ? head.length_mm : 0;
-    const Vec3 deepest = at + contact_.shown_offset_mm + axis * foot - away * head.radius_at_mm(foot);
-    r.thickness_mm = static_cast<float>(thickness_mm(bone, deepest + away * bone.frame().spacing_mm.x, -away));
-  }
-  if (anatomy_.structures && usable) {
-    const auto near = anatomy_.structures->clearance(burr.head(), at + contact_.shown_offset_mm, axis);
+  if (usable && contact_.normal_force_n > 0 && loaded_ != nullptr) r.thickness_mm = static_cast<float>(thickness(at, axis));
+  if (anatomy_.structures && usable && !scene_->plate && !scene_->items.empty()) {
+    // What is at risk belongs to the patient: it goes with the first body.
+    const RigidTransform& own = scene_->items.front().body_from_world;
+    const auto near = anatomy_.structures->clearance(burr.head(), own(at + contact_.shown_offset_mm), own.rotation * axis);
     r.clearance_mm = static_cast<float>(near.distance_mm);
     r.structure = near.structure;
     if (near.structure != 0 && near.distance_mm <= 0)
@@ -158,15 +278,11 @@ HapticRenderer::Step HapticRenderer::step(BrickGrid& bone, const DeviceSample& s
   }
 
   double removed = 0;
+  if (held_) flags_ |= kHeld;
   // A hand whose force is not back yet, or that is not heard of, removes nothing.
-  if (pose.drill_on != 0 && (out.flags & (kPoseJumped | kPoseStale)) == 0) {
-    result.changes = removal_.remove(bone, model_->cut(bone), burr, contact_.normal_force_n, params_.effects.speed_rpm, dt_s_,
-                                     anatomy_.hardness.get(), removed);
-  }
-  if (depth_map_) {
-    const std::size_t n = std::min(result.changes.size(), changed_.size());
-    for (std::size_t i = 0; i < n; ++i) changed_[i] = result.changes[i].voxel;
-    depth_map_->update(bone, {changed_.data(), n}, kMapBudget);
+  if (pose.drill_on != 0 && !held_ && (out.flags & (kPoseJumped | kPoseStale)) == 0) result.changes = remove(removed);
+  for (const HapticScene::Item& item : scene_->items) {
+    if (item.bone->depth_map_) item.bone->depth_map_->update(item.bone->bone_, {}, kMapBudget);
   }
 
   r.device = sample;

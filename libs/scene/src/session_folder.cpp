@@ -4,6 +4,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/bone/plates.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/session/haptic_settings.h"
@@ -59,27 +60,30 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
   return s;
 }
 
-BrickGrid bone_at_begin(const SessionFolder& session) {
-  if (!session.resumed_from.empty()) return bone_at_end(open_session_folder(session.resumed_from, session.case_folder));
-  return to_bricks(load_case(session.case_folder).bone);
+World world_of(const Case& the_case, const Anatomy& anatomy) {
+  World world(to_bricks(the_case.bone), anatomy.hardness);
+  if (const auto region = the_case.files.find("region"); region != the_case.files.end())
+    world.add_region(to_bricks(load_grid(region->second)), anatomy.region_hardness);
+  return world;
 }
 
-BrickGrid bone_at_end(const SessionFolder& session) {
-  BrickGrid bone = bone_at_begin(session);
+World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy) {
+  if (session.resumed_from.empty()) return world_of(the_case, anatomy);
+  return world_at_end(open_session_folder(session.resumed_from, session.case_folder), the_case, anatomy);
+}
+
+World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy) {
+  World world = world_at_begin(session, the_case, anatomy);
   const Session recorded = read_session(session.stream());
-  if (bone.hash() != recorded.header.bone_hash) {
+  if (world.hash() != recorded.header.bone_hash) {
     throw Error(ExitCode::corrupt, "the session '" + session.folder.string() + "' was recorded on another bone than its case holds now",
                 "give the case it was recorded on, unchanged");
   }
-  for (const VoxelChange& c : recorded.changes) {
-    if (c.voxel / BrickGrid::kVoxels >= bone.brick_count())
-      throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-    bone.set(c.voxel, c.density);
-  }
-  if (recorded.end && bone.hash() != recorded.end->bone_hash) {
+  apply_recorded(recorded, world);
+  if (recorded.end && world.hash() != recorded.end->bone_hash) {
     throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
   }
-  return bone;
+  return world;
 }
 
 void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, HapticSetup& setup) {
@@ -90,7 +94,7 @@ void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, Ha
   }
 }
 
-Anatomy anatomy_of(const Case& the_case, const BrickGrid& bone, HapticSetup& setup, const Context& context) {
+Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context) {
   Anatomy anatomy;
   if (setup.hardness) {
     const auto hu = the_case.files.find("hu");
@@ -98,7 +102,10 @@ Anatomy anatomy_of(const Case& the_case, const BrickGrid& bone, HapticSetup& set
       throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
                   "set \"hardness\" to false, or prepare the case with its hu.vdb");
     }
-    anatomy.hardness = std::make_shared<const Hardness>(bone, load_grid(hu->second));
+    const SparseGrid values = load_grid(hu->second);
+    anatomy.hardness = std::make_shared<const Hardness>(to_bricks(the_case.bone), values);
+    if (const auto region = the_case.files.find("region"); region != the_case.files.end())
+      anatomy.region_hardness = std::make_shared<const Hardness>(to_bricks(load_grid(region->second)), values);
   }
   setup.structures.clear();
   if (const auto file = the_case.files.find("structures"); file != the_case.files.end()) {
@@ -119,6 +126,11 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["rate_hz"] = rate_hz;
   j["burr"] = burr;
   j["removed_mm3"] = s.removed_mm3;
+  if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
+  if (s.bodies > 1) j["bodies"] = s.bodies;
+  for (const Fixture& f : s.fixtures) {
+    j["plates"].push_back({{"plate", plate_library()[f.plate].name}, {"number", f.id}, {"opening_mm", f.opening_mm}});
+  }
   j["bone_hash"] = s.bone_hash;
   j["surface_hash"] = s.surface_hash;
   j["session_bytes"] = s.session_bytes;

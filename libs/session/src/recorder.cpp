@@ -1,5 +1,6 @@
 #include "osteo/session/recorder.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace osteo {
@@ -38,11 +39,31 @@ std::size_t Recorder::drain() {
     }
     if (wanted > changes_buffer_.size()) changes_buffer_.resize(wanted);
     const std::size_t got = reader_.changes.pop({changes_buffer_.data(), wanted});
+    for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
     total += n;
-    if (failure_) continue;  // keep draining, so that the servo's ring does not fill
     try {
-      writer_.append({ticks_buffer_.data(), n}, {changes_buffer_.data(), got});
-      ticks_ += n;  // told only once the file has them: these survive whatever happens to this process
+      std::size_t begin = 0, changes_begin = 0;
+      const auto write_up_to = [&](std::size_t end) {
+        std::size_t changes_end = changes_begin;
+        for (std::size_t t = begin; t < end; ++t) changes_end += ticks_buffer_[t].voxels_changed;
+        changes_end = std::min(changes_end, got);
+        if (!failure_ && end > begin)
+          writer_.append({ticks_buffer_.data() + begin, end - begin},
+                         {changes_buffer_.data() + changes_begin, changes_end - changes_begin});
+        begin = end;
+        changes_begin = changes_end;
+      };
+      // An action stands before its tick, whose record may not be here yet.
+      while (!actions_.empty() && actions_.front().tick <= ticks_buffer_[n - 1].tick) {
+        std::size_t at = begin;
+        while (ticks_buffer_[at].tick < actions_.front().tick) ++at;
+        write_up_to(at);
+        if (!failure_) writer_.append(actions_.front());
+        actions_.pop_front();
+      }
+      write_up_to(n);
+      if (failure_) continue;  // keep draining, so that the servo's ring does not fill
+      ticks_ += n;             // told only once the file has them: these survive whatever happens to this process
     } catch (const Error& e) {
       failure_ = e;
     }
@@ -53,6 +74,9 @@ void Recorder::stop() {
   stop_ = true;
   if (thread_.joinable()) thread_.join();
   drain();
+  // What was done after the last tick.
+  for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
+  for (; !actions_.empty() && !failure_; actions_.pop_front()) writer_.append(actions_.front());
 }
 
 }  // namespace osteo

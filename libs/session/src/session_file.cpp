@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 static_assert(std::endian::native == std::endian::little, "session files are little endian");
 
 constexpr std::uint32_t kMagic = 0x3146534f;  // "OSF1"
-enum FrameType : std::uint32_t { kHeader = 1, kTicks = 2, kChanges = 3, kEnd = 4 };
+enum FrameType : std::uint32_t { kHeader = 1, kTicks = 2, kChanges = 3, kEnd = 4, kActions = 5 };
 constexpr std::uint32_t kLongestFrame = 64U << 20;
 
 struct FrameHead {
@@ -112,6 +112,7 @@ SessionWriter::SessionWriter(const fs::path& path, const SessionHeader& h) : pat
   j["burr_library"] = h.burr_library;
   j["tick_bytes"] = sizeof(TickRecord);
   j["haptics"] = to_json(h.haptics);
+  j["dust"] = h.dust;
   frame(kHeader, bytes_of(j.dump()));
 }
 
@@ -135,6 +136,10 @@ void SessionWriter::frame(std::uint32_t type, std::span<const std::byte> payload
     done += static_cast<std::size_t>(n);
   }
   bytes_ += all.size();
+}
+
+void SessionWriter::append(const SceneAction& action) {
+  frame(kActions, std::as_bytes(std::span(&action, 1)));
 }
 
 void SessionWriter::append(std::span<const TickRecord> ticks, std::span<const VoxelChange> changes) {
@@ -162,6 +167,7 @@ void SessionWriter::finish(const SessionEnd& e) {
   j["bone_hash"] = e.bone_hash;
   j["surface_hash"] = e.surface_hash;
   j["removed_mm3"] = e.removed_mm3;
+  j["dust_hash"] = e.dust_hash;
   frame(kEnd, bytes_of(j.dump()));
   sync();
 }
@@ -199,14 +205,19 @@ Session read_session(const fs::path& path) {
                       "replay it with that version");
         }
         session.header.haptics = setup_of(j.at("haptics"));
+        session.header.dust = j.value("dust", false);
         first = false;
       } else if (head.type == kTicks) {
         append_records(session.ticks, payload);
       } else if (head.type == kChanges) {
         append_records(session.changes, payload);
+      } else if (head.type == kActions) {
+        std::vector<SceneAction> actions;
+        append_records(actions, payload);
+        for (const SceneAction& a : actions) session.actions.push_back({a, session.changes.size()});
       } else if (head.type == kEnd) {
         const auto j = ordered_json::parse(text);
-        session.end = SessionEnd{j.at("ticks"), j.at("bone_hash"), j.at("surface_hash"), j.at("removed_mm3")};
+        session.end = SessionEnd{j.at("ticks"), j.at("bone_hash"), j.at("surface_hash"), j.at("removed_mm3"), j.value("dust_hash", "")};
       }
     } catch (const nlohmann::json::exception& e) {
       throw Error(ExitCode::corrupt, name + " has a damaged frame: " + e.what());

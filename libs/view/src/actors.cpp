@@ -5,6 +5,7 @@
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
 #include <vtkLightKit.h>
+#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
@@ -14,6 +15,8 @@
 
 #include <cmath>
 #include <numbers>
+
+#include "osteo/io/vtk_data.h"
 
 namespace osteo {
 
@@ -31,6 +34,24 @@ vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data) {
   p->SetSpecular(0.12);
   p->SetSpecularPower(25);
   return actor;
+}
+
+vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh) {
+  auto actor = make_bone_actor(to_vtk(mesh));
+  vtkProperty* const p = actor->GetProperty();
+  p->SetColor(0.62, 0.66, 0.74);
+  p->SetSpecular(0.55);
+  p->SetSpecularPower(30);
+  return actor;
+}
+
+void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& t) {
+  for (int r = 0; r < 3; ++r) {
+    const auto a = static_cast<std::size_t>(r);
+    for (int c = 0; c < 3; ++c) matrix->SetElement(r, c, t.rotation.column[static_cast<std::size_t>(c)][a]);
+    matrix->SetElement(r, 3, t.shift_mm[a]);
+  }
+  matrix->Modified();
 }
 
 vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {

@@ -4,6 +4,7 @@
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
 #include <vtkMapper.h>
+#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -11,7 +12,9 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 #include <vtkTypeInt32Array.h>
+#include <vtkUnsignedCharArray.h>
 
+#include <cmath>
 #include <set>
 #include <tuple>
 
@@ -21,6 +24,24 @@ namespace osteo {
 namespace {
 
 constexpr int kChunkBricks = 6;  // 48 voxels: an edit renews about 15,000 triangles, a head has about 500 chunks
+constexpr double kBone[3] = {0.93, 0.88, 0.77};
+constexpr double kFadeMm = 0.8;  // bone this thick lets a third of the colour below through (a guess: what drilled bone looks like)
+
+// Bone, or what lies a little below it.
+void colour_at(const StructureMap& structures, Vec3 p, Vec3 outwards, unsigned char* rgb) {
+  double share = 0;
+  std::array<double, 3> below{};
+  if (const auto near = structures.at(p); near.structure != 0 && near.distance_mm < BoneView::kShownThroughMm) {
+    for (double t = 0; t <= BoneView::kShownThroughMm; t += 0.25) {
+      const auto there = structures.at(p - outwards * t);
+      if (there.structure == 0 || there.distance_mm > 0) continue;
+      share = std::exp(-t / kFadeMm);
+      below = structures.colour_of(there.structure);
+      break;
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) rgb[c] = static_cast<unsigned char>(std::lround(255 * (kBone[c] * (1 - share) + below[c] * share)));
+}
 
 }  // namespace
 
@@ -45,6 +66,8 @@ void BoneView::show(const LiveSurface& surface) {
     c.data = vtkSmartPointer<vtkPolyData>::New();
     c.actor = make_bone_actor(c.data);
     c.actor->GetProperty()->BackfaceCullingOn();
+    if (structures_ != nullptr) c.actor->GetMapper()->ScalarVisibilityOn();
+    if (matrix_) c.actor->SetUserMatrix(matrix_);
     rebuild(c, surface);
     renderer_->AddActor(c.actor);
   }
@@ -75,6 +98,10 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   float* n = normals->GetPointer(0);
   int* c = connectivity->GetPointer(0);
   const bool mirrored = determinant(frame.direction) < 0;
+  vtkNew<vtkUnsignedCharArray> colours;
+  colours->SetNumberOfComponents(3);
+  colours->SetNumberOfTuples(structures_ != nullptr ? static_cast<vtkIdType>(points) : 0);
+  unsigned char* rgb = colours->GetPointer(0);
   int base = 0;
   for (const std::uint32_t b : chunk.bricks) {
     const SurfacePatch& patch = surface.patch(b);
@@ -86,6 +113,10 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
       for (std::size_t a = 0; a < 3; ++a) {
         *p++ = static_cast<float>(w[a]);
         *n++ = static_cast<float>(d[a]);
+      }
+      if (structures_ != nullptr) {
+        colour_at(*structures_, w, d, rgb);
+        rgb += 3;
       }
     }
     for (const auto& t : patch.triangles) {
@@ -104,9 +135,23 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   chunk.data->SetPoints(vtk_points);
   chunk.data->SetPolys(cells);
   chunk.data->GetPointData()->SetNormals(normals);
+  if (structures_ != nullptr) chunk.data->GetPointData()->SetScalars(colours);
   chunk.data->Modified();
   chunk.actor->GetMapper()->Update();
   chunk.actor->SetVisibility(triangles > 0 ? 1 : 0);
+}
+
+void BoneView::place(const RigidTransform& t) {
+  if (!matrix_) {
+    if (t.rotation == Mat3{} && t.shift_mm == Vec3{}) return;
+    matrix_ = vtkSmartPointer<vtkMatrix4x4>::New();
+    for (const Chunk& c : chunks_) c.actor->SetUserMatrix(matrix_);
+  }
+  set_matrix(matrix_, t);
+}
+
+void BoneView::highlight(bool on) {
+  for (const Chunk& c : chunks_) c.actor->GetProperty()->SetAmbient(on ? 0.3 : 0.08);
 }
 
 std::size_t BoneView::triangles() const {

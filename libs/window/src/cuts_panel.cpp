@@ -26,7 +26,7 @@ void CutsPanel::release() {
   glDeleteTextures(3, textures_.data());
 }
 
-void CutsPanel::draw(const Rehearsal& rehearsal, int tool, Box box) {
+void CutsPanel::draw(Rehearsal& rehearsal, int tool, Box box) {
   const TickRecord tick = rehearsal.latest();
   const auto& p = tick.device.position_mm;
   const Vec3 burr{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
@@ -46,11 +46,24 @@ void CutsPanel::draw(const Rehearsal& rehearsal, int tool, Box box) {
   ImGui::SliderFloat("mm", &span_mm_, 20, 250, "%.0f");
 
   // What is left of the bone, in the grey of its CT value where the case has it.
-  const BrickGrid& bone = rehearsal.bone();
+  struct Part {
+    std::shared_ptr<const Body> body;
+    RigidTransform own;
+  };
+  std::vector<Part> parts;
+  if (redraw) {
+    rehearsal.look([&](const World& world, Follower&) {
+      for (const PlacedBody& b : world.bodies()) parts.push_back({b.body, b.world_from_body.inverse()});
+    });
+  }
   const GreyAt grey = [&](Vec3 at) {
-    const double density = static_cast<double>(bone.nearest(at));
-    if (density <= 0) return 0.0;
-    return density * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(at)))) : 220.0);
+    for (const Part& part : parts) {
+      // The grey is the case's where the piece came from.
+      const Vec3 own = part.own(at);
+      const double density = static_cast<double>(part.body->bone.nearest(own));
+      if (density > 0) return density * (hu_ ? std::max(40.0, grey_of_hu(static_cast<double>(hu_->nearest(own)))) : 220.0);
+    }
+    return 0.0;
   };
   static constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
   for (std::size_t n = 0; n < 3; ++n) {

@@ -21,7 +21,7 @@ class CutsPanel {
   /// Draws the cuts anew at the next frame; otherwise about seven times a second.
   void renew() { age_s_ = 1e9; }
   /// Between ImGui::NewFrame and Render.
-  void draw(const Rehearsal& rehearsal, int tool, Box box);
+  void draw(Rehearsal& rehearsal, int tool, Box box);
 
  private:
   std::array<unsigned, 3> textures_{};

@@ -27,12 +27,13 @@
 
 #include "cuts_panel.h"
 #include "gamepad.h"
+#include "help_panel.h"
 #include "osteo/base/error.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
-#include "osteo/view/bone_view.h"
-#include "osteo/view/dust_view.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/world_view.h"
+#include "scene_tools.h"
 #include "status_panel.h"
 
 namespace osteo {
@@ -56,8 +57,8 @@ class RehearsalWindow {
   ~RehearsalWindow() {
     glfwMakeContextCurrent(window_);
     cuts_.release();
-    bone_view_.reset();
-    dust_view_.reset();
+    tools_.reset();
+    world_view_.reset();
     render_window_->Finalize();
     ImGui_ImplOpenGL3_Shutdown();
     ImGui_ImplGlfw_Shutdown();
@@ -135,20 +136,24 @@ class RehearsalWindow {
 
   // The running rehearsal has another bone: show it.
   void new_bone() {
-    if (!bone_view_) bone_view_ = std::make_unique<BoneView>(renderer_);
-    actions_.rehearsal().with_surface([&](const LiveSurface& surface, std::span<const std::uint32_t>) { bone_view_->show(surface); });
-    const BrickGrid& bone = actions_.rehearsal().bone();
+    world_view_ = std::make_unique<WorldView>(renderer_, actions_.rehearsal().structures());
     Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-      const Ijk o = bone.brick_coordinate(b);
-      const Vec3 p = bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], p[a]);
-        hi[a] = std::max(hi[a], p[a]);
+    actions_.rehearsal().look([&](const World& world, Follower& follower) {
+      world_view_->update(world, follower);
+      const BrickGrid& bone = world.bodies().front().body->bone;
+      for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+        const Ijk o = bone.brick_coordinate(b);
+        const Vec3 p = bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
+        for (std::size_t a = 0; a < 3; ++a) {
+          lo[a] = std::min(lo[a], p[a]);
+          hi[a] = std::max(hi[a], p[a]);
+        }
       }
-    }
+    });
     centre_ = (lo + hi) * 0.5;
     radius_ = std::max(5.0, 0.5 * length(hi - lo));
+    if (!tools_) tools_ = std::make_unique<SceneTools>(renderer_);
+    tools_->renew(centre_, 2 * radius_);
     cuts_.renew();
   }
 
@@ -218,28 +223,27 @@ class RehearsalWindow {
     return {w[0] / w[3], w[1] / w[3], w[2] / w[3]};
   }
 
-  // The bone under the mouse: a ray through the live voxels.
-  [[nodiscard]] std::optional<Vec3> bone_under(double x, double y) {
-    double position[3];
-    renderer_->GetActiveCamera()->GetPosition(position);
-    const Vec3 from{position[0], position[1], position[2]};
-    const Vec3 ray = normalized(unproject(x, y, centre_) - from);
-    const BrickGrid& bone = actions_.rehearsal().bone();
-    const double far = length(centre_ - from) + 2 * radius_, step = bone.frame().spacing_mm.x / 2;
-    for (double s = std::max(0.0, length(centre_ - from) - 2 * radius_); s < far; s += step) {
-      if (bone.nearest(from + ray * s) >= 0.5F) return from + ray * s;
-    }
-    return std::nullopt;
+  [[nodiscard]] ViewAxes view_axes() {
+    double p[3], up[3];
+    renderer_->GetActiveCamera()->GetPosition(p);
+    renderer_->GetActiveCamera()->GetViewUp(up);
+    const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]}));
+    return {{p[0], p[1], p[2]}, forward, right, cross(right, forward)};
   }
 
   void bring_drill_to_bone(double x, double y) {
-    const auto hit = bone_under(x, y);
+    // The bone under the mouse: a ray through the live voxels.
+    const Vec3 eye = view_axes().eye_mm;
+    std::optional<BoneHit> hit;
+    actions_.rehearsal().look([&](const World& world, Follower&) {
+      hit = bone_on_ray(world, eye, normalized(unproject(x, y, centre_) - eye), length(centre_ - eye) + 4 * radius_);
+    });
     if (!hit) {
       say("no bone under the mouse");
       return;
     }
     const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
-    goal_.position_mm = *hit - view_direction() * (r + 1);
+    goal_.position_mm = hit->at_mm - view_direction() * (r + 1);
     say("drill brought to the bone");
   }
 
@@ -256,15 +260,16 @@ class RehearsalWindow {
     panel();
     cuts_.draw(actions_.rehearsal(), tool_,
                {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
-    if (show_help_) help();
+    if (show_help_) draw_help(show_help_, width_);
     ImGui::Render();
 
     Rehearsal& rehearsal = actions_.rehearsal();
-    rehearsal.with_surface(
-        [&](const LiveSurface& surface, std::span<const std::uint32_t> changed) { bone_view_->update(surface, changed); });
+    rehearsal.look([&](const World& world, Follower& follower) { world_view_->update(world, follower); });
+    world_view_->highlight(tools_->piece());
     const TickRecord tick = rehearsal.latest();
     place_tool(tick);
-    dust(rehearsal, tick);
+    tools_->show(tick);
+    wash(rehearsal, tick);
 
     render_window_->SetSize(width_, height_);
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
@@ -283,17 +288,18 @@ class RehearsalWindow {
     glfwSwapBuffers(window_);
   }
 
-  // The dust as it lies; V sucks it off at the burr.
-  void dust(Rehearsal& rehearsal, const TickRecord& tick) {
-    rehearsal.with_dust([&](Dust& d) {
-      if (ImGui::IsKeyDown(ImGuiKey_V)) {
-        constexpr double kNozzleMm = 4, kMm3PerS = 60;
-        d.suck(from_floats(tick.device.position_mm), kNozzleMm, kMm3PerS * static_cast<double>(ImGui::GetIO().DeltaTime));
-      }
-      if (!dust_view_) dust_view_ = std::make_unique<DustView>(renderer_, rehearsal.bone().frame().spacing_mm.x);
-      dust_view_->update(d);
-    });
+  // The second hand: a sucker (V) and water (I) at the burr.
+  void wash(Rehearsal& rehearsal, const TickRecord& tick) {
+    constexpr double kNozzleMm = 4, kMm3PerS = 60, kSprayMm = 8, kSharePerS = 3;
+    const Vec3 at = from_floats(tick.device.position_mm);
+    const auto say_once = [&](bool wanted, bool& on, const SceneAction& with, const SceneAction& without) {
+      if (wanted || on) rehearsal.act(wanted ? with : without);
+      on = wanted;
+    };
+    say_once(ImGui::IsKeyDown(ImGuiKey_V), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS), SceneAction::suction(at, kNozzleMm, 0));
+    say_once(key_held(GLFW_KEY_I), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS), SceneAction::irrigate(at, kSprayMm, 0));
   }
+  [[nodiscard]] bool key_held(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS && !ImGui::GetIO().WantTextInput; }
 
   void place_tool(const TickRecord& tick) {
     const Vec3 axis = normalized(from_floats(tick.device.axis));
@@ -308,7 +314,9 @@ class RehearsalWindow {
       tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
     }
     tool_matrix_->Modified();
-    const bool on = tick.device.drill_on != 0;
+    const bool on = tick.device.drill_on != 0, shown = (tick.flags & kPlateInHand) == 0;
+    burr_->SetVisibility(shown ? 1 : 0);
+    shaft_->SetVisibility(shown ? 1 : 0);
     burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
   }
 
@@ -332,6 +340,8 @@ class RehearsalWindow {
                            unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
         camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
         camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
+      } else if (!tools_->in_hand()) {
+        use_tool(m, io);
       } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
         goal_.position_mm += view_direction() * (0.05 * static_cast<double>(-io.MouseDelta.y));
       } else if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) {
@@ -340,18 +350,34 @@ class RehearsalWindow {
       if (io.MouseWheel != 0) {
         if (io.KeyCtrl) {
           camera->Dolly(std::pow(1.1, static_cast<double>(io.MouseWheel)));
+        } else if (!tools_->in_hand()) {
+          tools_->push(1.0 * static_cast<double>(io.MouseWheel), actions_.rehearsal(), view_axes());
         } else {
           goal_.position_mm += view_direction() * (0.5 * static_cast<double>(io.MouseWheel));
         }
       }
     }
-    drill_held_ = in_view && !io.WantCaptureMouse && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    drill_held_ = in_view && !io.WantCaptureMouse && tools_->tool() == SceneTools::Tool::drill && ImGui::IsMouseDown(ImGuiMouseButton_Left);
     gamepad(static_cast<double>(io.DeltaTime));
     const std::vector<KeyPress> presses = std::exchange(pressed_keys_, {});
     if (!io.WantTextInput) {
       for (const KeyPress& k : presses) key(k, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
     }
     send_goal();
+  }
+
+  // Saw and pieces: what the mouse drags is not the hand.
+  void use_tool(const ImVec2& m, const ImGuiIO& io) {
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+      const Vec3 eye = view_axes().eye_mm;
+      tools_->pick(actions_.rehearsal(), eye, normalized(unproject(static_cast<double>(m.x), static_cast<double>(m.y), centre_) - eye));
+    }
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (io.MouseDelta.x == 0 && io.MouseDelta.y == 0)) return;
+    const Vec3 at = tools_->position_mm();
+    const Vec3 by = unproject(static_cast<double>(m.x), static_cast<double>(m.y), at) -
+                    unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), at);
+    const ViewAxes view = view_axes();
+    tools_->drag(dot(by, view.right), dot(by, view.up), io.KeyShift, actions_.rehearsal(), view);
   }
 
   void gamepad(double seconds) {
@@ -372,6 +398,9 @@ class RehearsalWindow {
   void key(KeyPress press, double x, double y, bool in_view) {
     if (press.key == GLFW_KEY_DOWN) goal_.position_mm += view_direction() * 0.25;
     if (press.key == GLFW_KEY_UP) goal_.position_mm -= view_direction() * 0.25;
+    if ((!press.repeated || press.key == GLFW_KEY_A || press.key == GLFW_KEY_E) &&
+        tools_->key(press.key, actions_.rehearsal(), view_axes()))
+      return;
     if (press.repeated) return;
     if (press.key >= GLFW_KEY_1 && press.key <= GLFW_KEY_7) set_diameter(press.key - GLFW_KEY_1 + 1);
     switch (press.key) {
@@ -503,6 +532,8 @@ class RehearsalWindow {
     if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_diameter(diameter);
     ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
     ImGui::Separator();
+    tools_->panel(rehearsal, view_axes());
+    ImGui::Separator();
     draw_status(rehearsal, tick);
     ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
@@ -523,7 +554,7 @@ class RehearsalWindow {
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
     if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
-    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(bone_view_->triangles()) / 1e6,
+    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(world_view_->triangles()) / 1e6,
                 static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
     scan_notes();
@@ -531,33 +562,6 @@ class RehearsalWindow {
     if (std::chrono::steady_clock::now() < message_until_) {
       ImGui::Separator();
       ImGui::TextWrapped("%s", message_.c_str());
-    }
-    ImGui::End();
-  }
-
-  void help() {
-    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 220, 90}, ImGuiCond_Appearing);
-    ImGui::SetNextWindowSize({460, 0});
-    ImGui::Begin("Mouse and keys", &show_help_, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse);
-    static constexpr const char* kRows[][2] = {{"move", "moves the drill across the view"},
-                                               {"F", "brings the drill to the bone under the mouse"},
-                                               {"wheel, Up, Down, Shift-drag", "moves it deeper or back"},
-                                               {"left button, Space", "drills while held; Space: on and off"},
-                                               {"right drag", "turns the view"},
-                                               {"middle drag", "shifts the view"},
-                                               {"Ctrl-wheel", "nearer and farther"},
-                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond"},
-                                               {"B, Y, T", "ball, cylinder, taper"},
-                                               {"V", "sucks dust off at the burr"},
-                                               {"S", "screenshot into the session's folder"},
-                                               {"F5", "save the session and go on"},
-                                               {"R", "save the session, the bone is whole again"},
-                                               {"Home", "view from the left"},
-                                               {"Q", "save and close"}};
-    for (const auto& row : kRows) {
-      ImGui::Text("%s", row[0]);
-      ImGui::SameLine(215);
-      ImGui::TextWrapped("%s", row[1]);
     }
     ImGui::End();
   }
@@ -571,8 +575,8 @@ class RehearsalWindow {
   vtkNew<vtkPolyDataMapper> burr_mapper_, shaft_mapper_;
   vtkNew<vtkActor> burr_, shaft_;
   vtkNew<vtkMatrix4x4> tool_matrix_;
-  std::unique_ptr<BoneView> bone_view_;
-  std::unique_ptr<DustView> dust_view_;
+  std::unique_ptr<WorldView> world_view_;
+  std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
   Vec3 centre_{};
   double radius_ = 100;
@@ -580,6 +584,7 @@ class RehearsalWindow {
   int tool_;
   std::string device_name_;
   int gl_errors_ = 0;
+  bool sucking_ = false, washing_ = false;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   std::vector<KeyPress> pressed_keys_;
   std::string message_;

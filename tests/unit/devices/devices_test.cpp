@@ -196,7 +196,7 @@ struct Loop {
     setup.device = device.traits();
     setup.params.contact.stiffness_n_per_mm = 2;
     renderer = std::make_unique<HapticRenderer>(setup, bone, Anatomy{}, 1e-3);
-    servo = std::make_unique<Servo>(bone, *renderer, device, stream, 1000);
+    servo = std::make_unique<Servo>(*renderer, device, stream, 1000);
   }
   ~Loop() {
     loop.request_stop();

@@ -436,7 +436,7 @@ TEST(LiveSurface, FollowsTheDrillToTheBit) {
   script.axis = {0.6, 0, 0.8};
   script.waypoints = {{0, {-5, 0, 4}, true}, {0.3, {-5, 0, 0}, true}, {1.0, {5, 3, -2}, true}};
   ScriptedDevice device(script, 1000);
-  Servo servo(bone, renderer, device, stream, 1000);
+  Servo servo(renderer, device, stream, 1000);
   std::vector<VoxelChange> changes(4096);
   while (servo.step(0)) {
     TickRecord tick;

@@ -51,10 +51,10 @@ struct Checked {
   double removed = 0;
   std::vector<TickRecord> records;
 
-  Checked(const HapticSetup& s, const BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, {}, dt_s), dt(dt_s), setup(s) {}
+  Checked(const HapticSetup& s, BrickGrid& bone, double dt_s = 1e-3) : renderer(s, bone, {}, dt_s), dt(dt_s), setup(s) {}
 
-  Vec3 step(BrickGrid& bone, const DeviceSample& sample) {
-    const auto [r, changes] = renderer.step(bone, sample);
+  Vec3 step(const DeviceSample& sample) {
+    const auto [r, changes] = renderer.step(sample);
     const Vec3 f{r.force_n[0], r.force_n[1], r.force_n[2]};
     EXPECT_TRUE(std::isfinite(length(f))) << ticks;
     EXPECT_TRUE(std::isfinite(r.torque_n_mm[0] + r.torque_n_mm[1] + r.torque_n_mm[2]));
@@ -122,7 +122,7 @@ TEST_P(HardCases, StayWithinAllBounds) {
     for (std::uint64_t t = 0; t < 2500; ++t) {
       const double s = std::min(1.0, static_cast<double>(t) / 1200);
       device.set_hand({}, c.from + (c.to - c.from) * s + o, 0.4);
-      force = run.step(bone, device.read(t, 1e-3, force));
+      force = run.step(device.read(t, 1e-3, force));
       if (t > 2200) late_speed = std::max(late_speed, length(device.velocity_mm_s()));
     }
     // Nothing may shake at rest; the drill's own vibration and drag may.
@@ -153,7 +153,7 @@ TEST(HardCase, StartedInsideTheForceLeadsOut) {
   for (const ContactMethod method : {ContactMethod::volume, ContactMethod::overlap}) {
     auto bone = test::solid(0.5, 12, [](Vec3 p) { return length(p) < 9; });
     Checked run(setup_for(method), bone);
-    for (int t = 0; t < 300; ++t) static_cast<void>(run.step(bone, at(3, 1, 0)));
+    for (int t = 0; t < 300; ++t) static_cast<void>(run.step(at(3, 1, 0)));
     EXPECT_GT(dot(run.last_force, normalized({3, 1, 0})), 0.8 * length(run.last_force));
     EXPECT_GT(length(run.last_force), 1);
     EXPECT_NE(run.flags & kEscape, 0u);
@@ -164,11 +164,11 @@ TEST(HardCase, AJumpOf50MmInATickBeginsAgainFromNothing) {
   for (const ContactMethod method : kMethods) {
     auto bone = test::slab(0.5);
     Checked run(setup_for(method), bone);
-    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 40)));
-    const Vec3 first = run.step(bone, at(0, 0, -10));
+    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(at(0, 0, 40)));
+    const Vec3 first = run.step(at(0, 0, -10));
     EXPECT_LT(length(first), 0.1);
     EXPECT_NE(run.records.back().flags & kPoseJumped, 0u);
-    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(bone, at(0, 0, -10)));
+    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(at(0, 0, -10)));
     EXPECT_LT(length(run.last_force), 1.2);  // a tenth of the way back
   }
 }
@@ -177,23 +177,23 @@ TEST(HardCase, APoseThatIsNotANumberFadesTheForceAndStopsTheDrill) {
   auto bone = test::slab(0.5);
   Checked run(setup_for(ContactMethod::overlap), bone);
   auto pose = at(0, 0, 1.2);
-  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(pose));
   EXPECT_GT(length(run.last_force), 0.5);
   pose.drill_on = 1;
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     auto broken = pose;
     broken.position_mm[2] = bad;
-    for (int t = 0; t < 20; ++t) static_cast<void>(run.step(bone, broken));
+    for (int t = 0; t < 20; ++t) static_cast<void>(run.step(broken));
     EXPECT_EQ(length(run.last_force), 0);
     EXPECT_NE(run.records.back().flags & kPoseInvalid, 0u);
     broken = pose;
     broken.axis[0] = bad;
-    static_cast<void>(run.step(bone, broken));
+    static_cast<void>(run.step(broken));
   }
   // The axis alone may be unusable: then it stands upright.
   pose.drill_on = 0;
   pose.axis = {0, 0, 0};
-  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(pose));
   EXPECT_GT(length(run.last_force), 0.5);
 }
 
@@ -202,20 +202,20 @@ TEST(HardCase, AnUnpluggedDeviceFadesAndRemovesNothing) {
   Checked run(setup_for(ContactMethod::overlap), bone);
   auto pose = at(0, 0, 1.2);
   pose.drill_on = 1;
-  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(pose));
   EXPECT_GT(run.removed, 0);
   const double removed = run.removed;
   for (int t = 0; t < 100; ++t) {
     pose.age_ms = static_cast<std::uint8_t>(std::min(255, 11 + t));
-    static_cast<void>(run.step(bone, pose));
+    static_cast<void>(run.step(pose));
   }
   EXPECT_EQ(run.removed, removed);
   EXPECT_EQ(length(run.last_force), 0);
   EXPECT_NE(run.records.back().flags & kPoseStale, 0u);
   pose.age_ms = 0;  // plugged in again: force comes back by and by
-  const Vec3 first = run.step(bone, pose);
+  const Vec3 first = run.step(pose);
   EXPECT_LT(length(first), 0.3);
-  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(bone, pose));
+  for (int t = 0; t < 200; ++t) static_cast<void>(run.step(pose));
   EXPECT_GT(length(run.last_force), 0.1);
 }
 
@@ -223,10 +223,10 @@ TEST(HardCase, BoneTakenAwayUnderTheBurrLetsGo) {
   for (const ContactMethod method : kMethods) {
     auto bone = test::slab(0.5);
     Checked run(setup_for(method), bone);
-    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 3 - t * 0.02)));
+    for (int t = 0; t < 100; ++t) static_cast<void>(run.step(at(0, 0, 3 - t * 0.02)));
     EXPECT_GT(length(run.last_force), 0.5);
     for (std::uint32_t v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) bone.set(v, 0);
-    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(bone, at(0, 0, 1)));
+    for (int t = 0; t < 10; ++t) static_cast<void>(run.step(at(0, 0, 1)));
     EXPECT_EQ(length(run.last_force), 0);
   }
 }
@@ -234,9 +234,9 @@ TEST(HardCase, BoneTakenAwayUnderTheBurrLetsGo) {
 TEST(HardCase, AStallOfFourTicksChangesTheForceWithoutAStep) {
   auto bone = test::slab(0.5);
   Checked run(setup_for(ContactMethod::overlap), bone);
-  for (int t = 0; t < 100; ++t) static_cast<void>(run.step(bone, at(0, 0, 3 - t * 0.01)));
+  for (int t = 0; t < 100; ++t) static_cast<void>(run.step(at(0, 0, 3 - t * 0.01)));
   const Vec3 before = run.last_force;
-  const Vec3 after = run.step(bone, at(0, 0, 3 - 104 * 0.01));  // the hand went on meanwhile
+  const Vec3 after = run.step(at(0, 0, 3 - 104 * 0.01));  // the hand went on meanwhile
   EXPECT_LT(length(after - before), 0.2);
 }
 
@@ -299,7 +299,7 @@ TEST(Fuzz, NoForceIsEverOutOfBounds) {
       if (dice == 501) s.axis[random() % 3] = std::numeric_limits<float>::infinity();
       if (dice == 502) s.position_mm[random() % 3] = 1e30F;
       if (dice == 503) s.axis = {};
-      static_cast<void>(run.step(bone, s));
+      static_cast<void>(run.step(s));
     }
     EXPECT_GT(run.removed, 1);
   }

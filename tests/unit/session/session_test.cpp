@@ -6,6 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/session/recorder.h"
 #include "osteo/session/script_file.h"
 #include "osteo/session/session_file.h"
 
@@ -43,7 +44,7 @@ TEST(SessionFile, RoundTrip) {
     SessionWriter w(path, header());
     w.append(some_ticks(0, 100), std::vector<VoxelChange>{{5, 0.5F}, {3, 0.9F}, {5, 0.25F}});
     w.append(some_ticks(100, 7), {});
-    w.finish({107, "bone", "surface", 26.75});
+    w.finish({107, "bone", "surface", 26.75, {}});
   }
   const Session s = read_session(path);
   EXPECT_EQ(s.header.rate_hz, 2000);
@@ -57,12 +58,87 @@ TEST(SessionFile, RoundTrip) {
   EXPECT_EQ(s.end->surface_hash, "surface");
 }
 
+TEST(SessionFile, ActionsStandBetweenTheChangesAroundThem) {
+  const auto path = fresh("actions");
+  {
+    StreamReader reader(1 << 10, 1 << 12);
+    Recorder recorder(reader, path, header());
+    auto ticks = some_ticks(0, 30);
+    const auto send = [&](std::size_t t) {
+      ticks[t].voxels_changed = 1;
+      reader.changes.push(VoxelChange{static_cast<VoxelKey>(t), 0.5F});
+      reader.ticks.push(ticks[t]);
+    };
+    for (std::size_t t = 0; t < 10; ++t) send(t);
+    SceneAction saw = SceneAction::saw({{1, 2, 3}, {0, 1, 0}});
+    saw.tick = 10;
+    reader.actions.push(saw);
+    recorder.drain();  // the action is here, its tick not yet
+    for (std::size_t t = 10; t < 30; ++t) {
+      if (t == 25) {
+        SceneAction undo = SceneAction::plain(ActionKind::undo);
+        undo.tick = 25;
+        reader.actions.push(undo);
+      }
+      send(t);
+    }
+    recorder.drain();
+    SceneAction last = SceneAction::split(4);
+    last.tick = 30;
+    reader.actions.push(last);  // the tick that did not come
+    recorder.stop();
+  }
+  const Session s = read_session(path);
+  ASSERT_EQ(s.ticks.size(), 30u);
+  ASSERT_EQ(s.actions.size(), 3u);
+  EXPECT_EQ(s.actions[0].changes_before, 10u);
+  EXPECT_EQ(s.actions[0].action.saw_cut().at_mm, (Vec3{1, 2, 3}));
+  EXPECT_EQ(s.actions[1].changes_before, 25u);
+  EXPECT_TRUE(s.actions[1].action.is(ActionKind::undo));
+  EXPECT_EQ(s.actions[2].changes_before, 30u);
+  EXPECT_EQ(s.actions[2].action.values[0], 4);
+}
+
+TEST(Script, ActionsAreReadAndErrorsSayWhich) {
+  const auto path = fresh("deeds.json");
+  const auto with = [&](const std::string& actions) {
+    std::filesystem::remove(path);
+    write_file(path, R"({"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1],
+      "waypoints": [{"t_s": 0, "at_mm": [0, 0, 0]}], "actions": [)" +
+                         actions + "]}");
+    return load_script(path);
+  };
+  const Script s = with(R"({"t_s": 1, "saw": {"at_mm": [1, 2, 3], "normal": [0, 0, 2], "kerf_mm": 0.9}},
+    {"t_s": 2, "split": {}}, {"t_s": 3, "move": {"piece": 1, "shift_mm": [0, 0, 10], "turn_deg": 90, "over_s": 1}},
+    {"t_s": 5, "attach": {"plate": "miniplate-4", "at_mm": [0, 0, 1], "x": [0, 1, 0], "pieces": [0, 1]}})");
+  const auto actions = actions_of(s, 1000);
+  ASSERT_EQ(actions.size(), 2u + 50u + 1u);
+  EXPECT_EQ(actions[0].tick, 1000u);
+  EXPECT_EQ(actions[0].saw_cut().kerf_mm, 0.9);
+  EXPECT_EQ(actions[2].tick, 3000u);
+  EXPECT_NEAR(actions[51].transform().shift_mm.z, 10, 1e-12);
+  EXPECT_NEAR(actions[51].transform().rotation.column[0].y, 1, 1e-12);
+  EXPECT_NEAR(actions[26].transform().shift_mm.z, 5, 1e-12);
+  EXPECT_EQ(actions.back().transform().rotation.column[0], (Vec3{0, 1, 0}));
+  for (const auto& [bad, word] : {std::pair{R"({"t_s": 1, "dance": {}})", "action 1"},
+                                  {R"({"t_s": 1, "split": {}}, {"t_s": 0, "undo": {}})", "action 2"},
+                                  {R"({"t_s": 1, "attach": {"plate": "tin", "at_mm": [0,0,0], "pieces": [0]}})", "tin"},
+                                  {R"({"t_s": 1, "saw": {}})", "at_mm"}}) {
+    try {
+      with(bad);
+      FAIL() << bad;
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find(word), std::string::npos) << e.what();
+    }
+  }
+}
+
 TEST(SessionFile, CutAnywhereKeepsWhatWasWholeBefore) {
   const auto path = fresh("cut");
   {
     SessionWriter w(path, header());
     for (std::uint64_t b = 0; b < 5; ++b) w.append(some_ticks(b * 10, 10), std::vector<VoxelChange>{{static_cast<VoxelKey>(b), 0.5F}});
-    w.finish({50, "bone", "surface", 1});
+    w.finish({50, "bone", "surface", 1, {}});
   }
   const std::string whole = read_text(path);
   const auto cut = fresh("cut2");
@@ -84,7 +160,7 @@ TEST(SessionFile, DamageInTheMiddleIsNotOverlooked) {
   {
     SessionWriter w(path, header());
     for (std::uint64_t b = 0; b < 5; ++b) w.append(some_ticks(b * 10, 10), {});
-    w.finish({50, "bone", "surface", 1});
+    w.finish({50, "bone", "surface", 1, {}});
   }
   std::string bytes = read_text(path);
   bytes[bytes.size() / 2] ^= 0x10;

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -27,7 +29,10 @@ class Dust {
   explicit Dust(const BrickGrid& bone, const DustParams& params = {});
 
   /// Dust where bone was removed; what is no whole unit waits for the next call.
-  void add(VoxelKey voxel, double mm3);
+  void add(VoxelKey voxel, double mm3) { add(bone_.coordinate(voxel), mm3); }
+  void add_at(Vec3 world_mm, double mm3);
+  /// Bone went or came in this brick by other means: what lies there and beside it looks again.
+  void bone_changed(std::uint32_t brick);
   /// Moves all dust by one cell at most; call it as often as a second has cells: 100 a second are 50 mm/s at 0.5 mm.
   void step();
   /// Out of the tool's way, along its surface's normals.
@@ -41,6 +46,8 @@ class Dust {
     double added_mm3 = 0, present_mm3 = 0, sucked_mm3 = 0, washed_mm3 = 0, fallen_mm3 = 0;  ///< added = the sum of the others, exactly
   };
   [[nodiscard]] Totals totals() const;
+  /// Of all that lies where.
+  [[nodiscard]] std::string hash() const;
   /// Cells that hold dust, in a fixed order: middle of the cell in mm and how full it is (1: packed).
   void visit(const std::function<void(Vec3, double)>& cell) const;
   [[nodiscard]] std::size_t awake_bricks() const { return awake_.size(); }
@@ -60,6 +67,7 @@ class Dust {
   }
   [[nodiscard]] bool solid(Ijk c) const { return bone_.at(c.i, c.j, c.k) >= 0.5F; }
   [[nodiscard]] bool in_reach(Ijk c) const;
+  void add(Ijk cell, double mm3);
   std::uint32_t* cell(Ijk c, bool make);
   void wake(Ijk c);
   void step_brick(Brick& brick);

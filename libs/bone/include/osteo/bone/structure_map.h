@@ -1,11 +1,14 @@
 // Structures at risk: how far a tool is from nerves, vessels and membranes.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/base/context.h"
 #include "osteo/bone/round_cone.h"
+#include "osteo/data/tri_mesh.h"
 #include "osteo/data/volume.h"
 #include "osteo/grid/brick_grid.h"
 
@@ -30,6 +33,10 @@ class StructureMap {
 
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
   [[nodiscard]] const std::vector<Structure>& structures() const { return structures_; }
+  /// The surface of all structures, closed, and for each point which it belongs to.
+  [[nodiscard]] std::pair<TriMesh, std::vector<std::uint8_t>> surface(const Context& context = {}) const;
+  /// Red, green, blue, 0 to 1: the map's own, or one of a fixed row.
+  [[nodiscard]] std::array<double, 3> colour_of(std::uint8_t structure) const;
   [[nodiscard]] std::string name_of(std::uint8_t structure) const;  ///< "structure 3" where the map has no name
   [[nodiscard]] std::size_t memory_bytes() const { return closeness_.memory_bytes() + nearest_.memory_bytes(); }
   [[nodiscard]] std::string hash() const;

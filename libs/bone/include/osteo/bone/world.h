@@ -24,7 +24,7 @@ enum class ActionKind : std::uint32_t {
   saw,       ///< take out a blade's width
   split,     ///< take apart what does not hang together
   move,      ///< put a piece somewhere, and all that is plated to it
-  grip,      ///< turn the plate in the hand
+  grip,      ///< take a plate into the hand, turn it, or put it away
   attach,    ///< fix a plate to one piece or two
   detach,    ///< take a plate off
   open,      ///< set the gap of a distractor
@@ -38,18 +38,18 @@ struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
 
   std::uint64_t tick = 0;
-  std::uint32_t kind = 0;        ///< ActionKind
-  std::uint32_t body = kNobody;  ///< id of a piece. saw: only this one, or all. attach: the one that the plate stays with
-  std::uint32_t other = kNobody; ///< attach: the second piece, which a distractor moves
-  std::uint32_t item = 0;        ///< attach: index in plate_library(); detach, open: id of the fixture
+  std::uint32_t kind = 0;         ///< ActionKind
+  std::uint32_t body = kNobody;   ///< id of a piece. saw: only this one, or all. attach: the one that the plate stays with
+  std::uint32_t other = kNobody;  ///< attach: the second piece, which a distractor moves
+  std::uint32_t item = 0;         ///< grip, attach: index in plate_library(), grip: or kNobody; detach, open: id of the fixture
   std::array<double, 12> values{};
 
   [[nodiscard]] bool is(ActionKind k) const { return kind == static_cast<std::uint32_t>(k); }
-  static SceneAction plain(ActionKind kind);                          ///< hold, resume, undo
+  static SceneAction plain(ActionKind kind);                                ///< hold, resume, undo
   static SceneAction saw(const SawCut& cut, std::uint32_t body = kNobody);  ///< in the world
   static SceneAction split(double least_mm3);
   static SceneAction move(std::uint32_t body, const RigidTransform& world_from_body);
-  static SceneAction grip(const RigidTransform& hand_from_plate);
+  static SceneAction grip(std::uint32_t plate, const RigidTransform& hand_from_plate = {});
   static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other = kNobody);
   static SceneAction detach(std::uint32_t fixture);
   static SceneAction open(std::uint32_t fixture, double opening_mm);
@@ -97,11 +97,19 @@ class World {
   /// with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along faces of the first body's voxels.
   void add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness = nullptr);
 
+  /// With bodies of its own (a copy by value would share them).
+  [[nodiscard]] World copy() const;
+  World(World&&) = default;
+  World& operator=(World&&) = default;
+
   [[nodiscard]] const std::vector<PlacedBody>& bodies() const { return bodies_; }
   [[nodiscard]] const std::vector<Fixture>& fixtures() const { return fixtures_; }
   [[nodiscard]] const PlacedBody* find(std::uint32_t body) const;
   /// The body that a voxel of the stream belongs to; null when there is none.
   [[nodiscard]] const PlacedBody* owner(VoxelKey name) const;
+  /// The plate that the hand holds instead of the drill; kNobody: the drill. attach() leaves the hand empty.
+  [[nodiscard]] std::uint32_t plate_in_hand() const { return plate_; }
+  /// How: the hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
   [[nodiscard]] const RigidTransform& grip() const { return grip_; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
@@ -149,6 +157,7 @@ class World {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> children;  // body, the one it came from
     std::vector<std::pair<VoxelKey, float>> loose;                  // names
   };
+  World(const World&) = default;  // shares bodies
   PlacedBody* placed(std::uint32_t body);
   [[nodiscard]] std::vector<std::uint32_t> joined_to(std::uint32_t body, std::uint32_t except_fixture) const;
   void move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by);
@@ -162,6 +171,7 @@ class World {
   std::vector<Fixture> fixtures_;
   std::vector<Done> done_;
   RigidTransform grip_;
+  std::uint32_t plate_ = SceneAction::kNobody;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
   bool held_ = false;
 };

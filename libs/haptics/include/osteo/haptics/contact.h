@@ -75,6 +75,8 @@ class ContactModel {
   [[nodiscard]] virtual Cut cut(const BrickGrid& bone) noexcept = 0;
   /// Another model is in use now: what this one remembers of the hand is out of date.
   virtual void rest() noexcept {}
+  /// What the last contact() overlapped, where that is all that matters: of several bones it may be added up. Null: it may not.
+  [[nodiscard]] virtual const OverlapResult* overlapped() const noexcept { return nullptr; }
 };
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers.

@@ -1,5 +1,6 @@
 // Devices: where the hand is, and what it feels.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,17 @@ struct Script {
   int tool = 3;  ///< index in burr_library()
   Vec3 axis{0, 0, 1};
   std::vector<Waypoint> waypoints;  ///< at least one, times rising
+  struct Deed {
+    double t_s = 0;
+    SceneAction action;
+  };
+  struct Camera {
+    Vec3 centre_mm;
+    double radius_mm = 32;
+    Vec3 eye{1, 0, 0};  ///< from the centre towards who looks
+  };
+  std::optional<Camera> camera;  ///< for its pictures; absent: from where the drill comes, around its strokes
+  std::vector<Deed> deeds;       ///< what else is done, times rising
   [[nodiscard]] double seconds() const { return waypoints.empty() ? 0 : waypoints.back().t_s; }
 };
 

@@ -1,28 +1,45 @@
 // The servo: the only writer of the live bone. One step a tick, the same for a device, a script and a replay.
 #pragma once
+#include <atomic>
+
 #include "osteo/haptics/device.h"
 #include "osteo/haptics/renderer.h"
 #include "osteo/haptics/stream.h"
 
 namespace osteo {
 
+/// Something done to the scene, and the scene that follows from it.
+struct Handover {
+  SceneAction action;            ///< its tick is filled in when it happens
+  HapticScene* scene = nullptr;  ///< null: as before. Belongs to whoever posts; lives until another was taken.
+  bool held = false;             ///< from now on nothing is removed
+};
+
 class Servo {
  public:
   /// All must outlive the servo. `rate_hz` fixes the time step, whatever the clock does.
-  Servo(BrickGrid& bone, HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz)
-      : bone_(bone), renderer_(renderer), device_(device), stream_(stream), dt_s_(1 / rate_hz) {}
+  Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz)
+      : renderer_(renderer), device_(device), stream_(stream), dt_s_(1 / rate_hz) {}
 
-  /// Read the device, compute the force, remove bone, tell the readers. False when the device has ended.
+  /// Take up what was posted, read the device, compute the force, remove bone, tell the readers. False when the device has ended.
   bool step(std::int64_t lateness_ns) noexcept;
-  [[nodiscard]] std::uint64_t ticks() const { return tick_; }
+  [[nodiscard]] std::uint64_t ticks() const { return ticks_.load(std::memory_order_relaxed); }
+
+  /// From one other thread: happens at the beginning of the next tick. False while one posted before waits still.
+  bool post(const Handover* handover) noexcept;
+  /// After the last step: what was posted and not taken happens at the tick that did not come, so that the stream tells of it.
+  void finish() noexcept;
+  /// Nothing posted waits. After a hold was posted: no density will change until something else is.
+  [[nodiscard]] bool taken() const noexcept { return inbox_.load(std::memory_order_acquire) == nullptr; }
 
  private:
-  BrickGrid& bone_;
   HapticRenderer& renderer_;
   Device& device_;
   Stream& stream_;
   double dt_s_;
-  std::uint64_t tick_ = 0;
+  std::atomic<std::uint64_t> ticks_{0};
+  std::atomic<const Handover*> inbox_{nullptr};
+  void take_up(std::uint64_t tick) noexcept;
   Vec3 force_n_;
 };
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "osteo/bone/world.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/rt/ring.h"
 
@@ -35,6 +36,8 @@ enum TickFlag : std::uint32_t {
   kCurveHeld = 256,          ///< the curve constraint holds
   kStructureTouched = 512,   ///< the burr reaches a structure at risk
   kStructureInjured = 1024,  ///< and it turns
+  kHeld = 2048,              ///< nothing was removed, since the scene is being changed
+  kPlateInHand = 4096,       ///< the hand holds a plate, not the drill
 };
 
 /// One tick, as it is written to session files (little endian).
@@ -60,18 +63,19 @@ struct TickRecord {
 };
 static_assert(sizeof(TickRecord) == 120);
 
-/// A voxel's new density.
+/// A voxel's new density; the name is that of the stream (Body::name_of).
 struct VoxelChange {
   VoxelKey voxel;
   float density;
 };
 static_assert(sizeof(VoxelChange) == 8);
 
-/// One reader's end of the stream. A tick record follows the changes of its tick.
+/// One reader's end of the stream. A tick record follows the actions and the changes of its tick.
 struct StreamReader {
   StreamReader(std::size_t tick_capacity, std::size_t change_capacity) : ticks(tick_capacity), changes(change_capacity) {}
   Ring<TickRecord> ticks;
   Ring<VoxelChange> changes;
+  Ring<SceneAction> actions{1 << 10};
   std::atomic<std::uint64_t> dropped{0};  ///< ticks or their changes lost because the reader was too slow
 };
 
@@ -81,6 +85,12 @@ class Stream {
   StreamReader& add_reader(std::size_t tick_capacity = 1 << 13, std::size_t change_capacity = 1 << 21) {
     readers_.push_back(std::make_unique<StreamReader>(tick_capacity, change_capacity));
     return *readers_.back();
+  }
+  /// Before the tick at whose beginning it happened.
+  void publish(const SceneAction& action) noexcept {
+    for (const auto& r : readers_) {
+      if (!r->actions.push(action)) r->dropped.fetch_add(1, std::memory_order_relaxed);
+    }
   }
   void publish(const TickRecord& tick, std::span<const VoxelChange> changes) noexcept {
     for (const auto& r : readers_) {

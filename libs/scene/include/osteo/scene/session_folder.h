@@ -25,15 +25,17 @@ struct SessionFolder {
 /// Errors: no_input, corrupt. `case_folder` overrides what the session says when it is not empty.
 [[nodiscard]] SessionFolder open_session_folder(const std::filesystem::path& folder, const std::filesystem::path& case_folder = {});
 
-/// The bone at the beginning of a session: the case's, drilled by the sessions it goes on from (their recorded changes).
-[[nodiscard]] BrickGrid bone_at_begin(const SessionFolder& session);
-/// The bone at the end of a session.
-[[nodiscard]] BrickGrid bone_at_end(const SessionFolder& session);
+/// The case's bone, with its finer region where it has one.
+[[nodiscard]] World world_of(const Case& the_case, const Anatomy& anatomy);
+/// The scene at the beginning of a session: the case's, as the sessions it goes on from have left it (their recorded changes and actions).
+[[nodiscard]] World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy);
+/// The scene at the end of a session.
+[[nodiscard]] World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy);
 
 /// Settings from `file`, or where that is empty from haptics.json of the case where there is one.
 void apply_haptic_settings(const std::filesystem::path& case_folder, const std::filesystem::path& file, HapticSetup& setup);
 /// What the case knows besides bone, as the setup asks for it; names the structures in the setup. Errors: no_input (hardness asked, no HU).
-[[nodiscard]] Anatomy anatomy_of(const Case& the_case, const BrickGrid& bone, HapticSetup& setup, const Context& context);
+[[nodiscard]] Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context);
 
 /// Writes summary.json and returns its text.
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr,

@@ -1,6 +1,7 @@
 // Writes the stream to a session file from a thread of its own.
 #pragma once
 #include <atomic>
+#include <deque>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -35,6 +36,7 @@ class Recorder {
   SessionWriter writer_;
   std::vector<TickRecord> ticks_buffer_;
   std::vector<VoxelChange> changes_buffer_;
+  std::deque<SceneAction> actions_;  // taken from the stream, their ticks not yet
   std::atomic<std::uint64_t> ticks_{0};
   double removed_mm3_ = 0;
   std::atomic<bool> stop_{false};

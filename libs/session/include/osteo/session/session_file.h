@@ -15,10 +15,11 @@ namespace osteo {
 /// What a replay needs to know before the first tick.
 struct SessionHeader {
   std::string program_version;
-  std::string bone_hash;  ///< of the bone before the first tick
+  std::string bone_hash;  ///< World::hash() before the first tick
   double rate_hz = 1000;
   int burr_library = kBurrLibraryVersion;
   HapticSetup haptics;
+  bool dust = false;  ///< the scene has bone dust
 };
 
 /// How it ended.
@@ -27,6 +28,7 @@ struct SessionEnd {
   std::string bone_hash;
   std::string surface_hash;
   double removed_mm3 = 0;
+  std::string dust_hash;  ///< empty where the scene has none
 };
 
 class SessionWriter {
@@ -37,6 +39,8 @@ class SessionWriter {
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
 
+  /// At the beginning of a tick: after the ticks and changes before it, before those of it.
+  void append(const SceneAction& action);
   /// Ticks in order; changes of the same ticks, any number a voxel, the last one counts.
   void append(std::span<const TickRecord> ticks, std::span<const VoxelChange> changes);
   /// To the disk, not only to the system.
@@ -52,12 +56,20 @@ class SessionWriter {
   std::vector<VoxelChange> coalesced_;
 };
 
+/// Something done to the scene, and how many of the changes came before it.
+struct RecordedAction {
+  SceneAction action;
+  std::size_t changes_before = 0;
+};
+
 struct Session {
   SessionHeader header;
   std::vector<TickRecord> ticks;
-  std::vector<VoxelChange> changes;  ///< in the order written; applied in this order they give the bone at the end
-  std::uint64_t torn_bytes = 0;      ///< behind the last whole frame, left out
-  std::optional<SessionEnd> end;     ///< absent when the program was stopped before it could close the file
+  std::vector<VoxelChange>
+      changes;  ///< in the order written; applied in this order, with the actions between them, they give the scene at the end
+  std::vector<RecordedAction> actions;
+  std::uint64_t torn_bytes = 0;   ///< behind the last whole frame, left out
+  std::optional<SessionEnd> end;  ///< absent when the program was stopped before it could close the file
 };
 
 /// Reads all whole frames. Errors: no_input, cannot_read; corrupt when the header is damaged or a frame in the middle is.

@@ -2,10 +2,13 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
+#include "osteo/bone/rigid_transform.h"
 #include "osteo/bone/round_cone.h"
+#include "osteo/data/tri_mesh.h"
 #include "osteo/data/vec.h"
 
 class vtkActor;
+class vtkMatrix4x4;
 class vtkPolyData;
 class vtkRenderer;
 
@@ -15,6 +18,9 @@ namespace osteo {
 [[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
+/// Metal: plates and screws.
+[[nodiscard]] vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh);
+void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);
 /// Dark blue background, key, fill and head light.
 void set_up_scene(vtkRenderer* renderer);
 /// Camera that sees a ball of `radius_mm` around `centre_mm` from `eye` (unit, LPS), head up.

@@ -8,8 +8,11 @@
 #include <vtkSmartPointer.h>
 
 #include "osteo/bone/live_surface.h"
+#include "osteo/bone/rigid_transform.h"
+#include "osteo/bone/structure_map.h"
 
 class vtkActor;
+class vtkMatrix4x4;
 class vtkPolyData;
 class vtkRenderer;
 
@@ -17,7 +20,9 @@ namespace osteo {
 
 class BoneView {
  public:
-  explicit BoneView(vtkRenderer* renderer) : renderer_(renderer) {}
+  /// With `structures`: where bone over them is thinner than kShownThroughMm, their colour shines through.
+  explicit BoneView(vtkRenderer* renderer, const StructureMap* structures = nullptr) : renderer_(renderer), structures_(structures) {}
+  static constexpr double kShownThroughMm = 2.5;
   ~BoneView();
   BoneView(const BoneView&) = delete;
   BoneView& operator=(const BoneView&) = delete;
@@ -26,6 +31,9 @@ class BoneView {
   void show(const LiveSurface& surface);
   /// Renews the chunks that hold these bricks.
   void update(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
+  /// Where the bone is now.
+  void place(const RigidTransform& world_from_body);
+  void highlight(bool on);
   [[nodiscard]] std::size_t triangles() const;
 
  private:
@@ -37,6 +45,8 @@ class BoneView {
   void rebuild(Chunk& chunk, const LiveSurface& surface);
 
   vtkRenderer* renderer_;
+  const StructureMap* structures_;
+  vtkSmartPointer<vtkMatrix4x4> matrix_;  // null: it has not moved
   std::vector<Chunk> chunks_;
   std::vector<std::uint32_t> chunk_of_brick_;
 };

@@ -1,0 +1,66 @@
+// Everything that decides what a rehearsal feels like.
+#pragma once
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "osteo/bone/structure_map.h"
+#include "osteo/haptics/contact.h"
+#include "osteo/haptics/curve_constraint.h"
+#include "osteo/haptics/guard.h"
+
+namespace osteo {
+
+struct EffectParams {
+  bool shaft = true;
+  bool fail_safe = true;
+  double drag = 0.15;
+  bool left_handed = false;
+  double speed_rpm = Burr::kNominalRpm;
+  bool vibration = true;
+
+  static void describe(EffectParams& p, auto& visit) {
+    visit({"shaft", "the shaft collides too"}, p.shaft);
+    visit({"fail_safe", "deep in bone, where the burr has no direction of its own, push along a distance map"}, p.fail_safe);
+    visit({"drag", "pull of the teeth along the surface, for each newton pressed, at the equator (a guess)", "", 0, 2}, p.drag);
+    visit({"left_handed", "the burr turns the other way"}, p.left_handed);
+    visit({"speed_rpm", "of the burr; removal is in proportion", "rpm", 0, 200000}, p.speed_rpm);
+    visit({"vibration", "the running drill shakes the hand"}, p.vibration);
+  }
+};
+
+/// Everything that decides what a session feels like; written into its header.
+struct HapticsParams {
+  using Params = HapticsParams;
+  ContactParams contact;
+  EffectParams effects;
+  GuardParams guard;
+
+  static void describe(HapticsParams& p, auto& visit) {
+    ContactParams::describe(p.contact, visit);
+    EffectParams::describe(p.effects, visit);
+    GuardParams::describe(p.guard, visit);
+  }
+};
+
+/// Everything that decides what a rehearsal feels like; a session's header holds it. An empty part costs nothing.
+struct HapticSetup {
+  HapticsParams params;
+  DeviceTraits device;
+  std::map<int, ContactMethod> tool_methods;  ///< index in burr_library() -> another method than params.contact.method for that tool
+  bool hardness = false;                      ///< removal goes by the HU of the case
+  std::string structures;                     ///< hash of the structures at risk that are watched; empty: none
+  std::vector<Vec3> curve;                    ///< points of a virtual fixture in mm; fewer than 2: none
+  CurveConstraintParams curve_params;
+  std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
+};
+
+/// What is known of the patient besides bone; what is null costs nothing.
+struct Anatomy {
+  std::shared_ptr<const Hardness> hardness;         ///< of the case's bone, voxel by voxel
+  std::shared_ptr<const Hardness> region_hardness;  ///< of its finer region
+  std::shared_ptr<const StructureMap> structures;
+};
+
+}  // namespace osteo

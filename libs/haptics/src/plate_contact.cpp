@@ -1,0 +1,84 @@
+// Contact of a plate in the hand with bone.
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/haptics/haptic_scene.h"
+
+namespace osteo {
+namespace {
+
+// Density between voxel centres, linear in each direction.
+float linear(const BrickGrid& bone, Vec3 x) noexcept {
+  const double fi = std::floor(x.x), fj = std::floor(x.y), fk = std::floor(x.z);
+  const int i = static_cast<int>(fi), j = static_cast<int>(fj), k = static_cast<int>(fk);
+  const auto u = static_cast<float>(x.x - fi), v = static_cast<float>(x.y - fj), w = static_cast<float>(x.z - fk);
+  float d[8];
+  if ((i & 7) != 7 && (j & 7) != 7 && (k & 7) != 7) {
+    const VoxelKey first = bone.find(i, j, k);
+    if (first == BrickGrid::kNone) return 0;
+    const float* const p = bone.values_of_brick(first / BrickGrid::kVoxels) + first % BrickGrid::kVoxels;
+    for (int c = 0; c < 8; ++c) d[c] = p[(c & 1) + (c >> 1 & 1) * 8 + (c >> 2) * 64];
+  } else {
+    for (int c = 0; c < 8; ++c) d[c] = bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+  }
+  const auto mix = [](float a, float b, float t) { return a + (b - a) * t; };
+  return mix(mix(mix(d[0], d[1], u), mix(d[2], d[3], u), v), mix(mix(d[4], d[5], u), mix(d[6], d[7], u), v), w);
+}
+
+}  // namespace
+
+ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& world_from_plate, std::span<const HapticScene::Item> items,
+                            const ContactParams& params) noexcept {
+  constexpr double kReachMm = 4;    // farther than that inside bone a sample knows no way out
+  constexpr double kFullMm = 0.05;  // from this depth on a sample counts with its whole area
+  ContactResult r;
+  if (!std::isfinite(dot(world_from_plate.shift_mm, world_from_plate.shift_mm))) return r;
+  Vec3 push{}, moment{};
+  double touching = 0;
+  for (const HapticScene::Item& item : items) {
+    const RigidTransform own = item.body_from_world * world_from_plate;
+    if (!item.bone->near(own.shift_mm, plate.radius_mm)) continue;
+    const BrickGrid& bone = item.bone->bone();
+    const Frame& frame = bone.frame();
+    const double h = frame.spacing_mm.x, step = 0.5;
+    const Mat3 to_index = transposed(frame.direction);
+    for (const PlateSample& s : plate.samples) {
+      Vec3 x = frame.index_from_world(own(s.at_mm));
+      float before = linear(bone, x);
+      if (before < 0.5F) continue;
+      const Vec3 back = to_index * (own.rotation * s.outwards) * -step;
+      double way = 0;
+      bool out = false;
+      for (way = step; way * h <= kReachMm; way += step) {
+        x += back;
+        const float now = linear(bone, x);
+        if (now < 0.5F) {
+          way -= step * static_cast<double>((0.5F - now) / (before - now));
+          out = true;
+          break;
+        }
+        before = now;
+      }
+      ++r.immersed;
+      if (!out) continue;
+      const double depth = way * h, area = s.area_mm2 * std::min(1.0, depth / kFullMm);
+      const Vec3 outwards = world_from_plate.rotation * s.outwards;
+      push -= outwards * (depth * area);
+      moment += cross(world_from_plate.rotation * s.at_mm, outwards) * (-depth * area);
+      touching += area;
+    }
+  }
+  // A corner alone is a twentieth of the underside, so that its push grows from nothing.
+  const double share = 1 / std::max(touching, 0.05 * plate.side_mm2);
+  const double depth = length(push) * share;
+  if (!(depth > 0)) return r;
+  r.normal = push / length(push);
+  r.depth_mm = depth;
+  r.normal_force_n = params.force_n(depth);
+  r.force_n = r.normal * r.normal_force_n;
+  r.torque_n_mm = moment * (share * r.normal_force_n / depth);
+  r.shown_offset_mm = r.normal * depth;
+  return r;
+}
+
+}  // namespace osteo

@@ -1,0 +1,44 @@
+// A scene that is operated on: its world, what the servo touches of it, and how one changes while the other runs.
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "osteo/haptics/servo.h"
+
+namespace osteo {
+
+/// Between a world, which is changed step by step, and a servo, which must never wait. An action makes the next world, then what the servo
+/// keeps of the bodies that are new, and hands that over; it happens at the beginning of the next tick. While that is prepared by the
+/// clock, nothing is removed (an action of its own in the stream, ActionKind::hold), so the outcome follows from the stream alone.
+class Operation {
+ public:
+  /// What is given by reference must outlive this.
+  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz);
+
+  bool step(std::int64_t lateness_ns) noexcept { return servo_.step(lateness_ns); }
+  /// After the last step: the stream tells of what was done and not yet taken up.
+  void finish() noexcept { servo_.finish(); }
+  [[nodiscard]] std::uint64_t ticks() const { return servo_.ticks(); }
+  [[nodiscard]] const World& world() const { return world_; }
+  [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
+
+  /// Called when something was done and the servo does not know it yet: bodies that are new are still as they were made.
+  using Done = std::function<void(const World::Effect&)>;
+  /// In the thread that also steps; at most one action a tick.
+  World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
+  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is waited for. `held`:
+  /// called while nothing is removed and before anything changes, for those that have to be up to date.
+  World::Effect act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
+                         const Done& done = {}, const World::ComponentsOf& components = {});
+
+ private:
+  void hand_over(const SceneAction& action, bool changes_scene);
+
+  World world_;
+  HapticRenderer renderer_;
+  Servo servo_;
+  std::unique_ptr<HapticScene> scene_, old_scene_;
+  Handover handover_;
+};
+
+}  // namespace osteo

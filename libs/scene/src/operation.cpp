@@ -1,0 +1,65 @@
+#include "osteo/scene/operation.h"
+
+#include <chrono>
+#include <thread>
+
+namespace osteo {
+namespace {
+
+bool takes_time(const SceneAction& a) {
+  return a.is(ActionKind::saw) || a.is(ActionKind::split) || a.is(ActionKind::undo);
+}
+bool changes_what_is_touched(const SceneAction& a) {
+  return !(a.is(ActionKind::hold) || a.is(ActionKind::resume) || a.is(ActionKind::suction) || a.is(ActionKind::irrigate));
+}
+
+}  // namespace
+
+Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz)
+    : world_(std::move(world)), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, device, stream, rate_hz) {
+  scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup()));
+  renderer_.show(scene_.get());
+}
+
+// Only when nothing posted before waits: the scene before the last is then nobody's any more.
+void Operation::hand_over(const SceneAction& action, bool changes_scene) {
+  handover_ = {action, nullptr, world_.held()};
+  if (changes_scene) {
+    auto next = std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup(), scene_.get()));
+    old_scene_ = std::exchange(scene_, std::move(next));
+    handover_.scene = scene_.get();
+  }
+  servo_.post(&handover_);
+}
+
+World::Effect Operation::act(const SceneAction& action, const Done& done, const World::ComponentsOf& components) {
+  World::Effect effect = world_.act(action, components);
+  if (!effect.done) return effect;
+  if (done) done(effect);
+  hand_over(action, changes_what_is_touched(action));
+  return effect;
+}
+
+World::Effect Operation::act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
+                                  const Done& done, const World::ComponentsOf& components) {
+  const auto wait = [&] {
+    while (!servo_.taken() && running()) std::this_thread::sleep_for(std::chrono::microseconds(100));
+  };
+  World::Effect ended;
+  ended.done = false;
+  ended.message = "the session has ended";
+  wait();
+  if (!servo_.taken()) return ended;
+  const bool hold = takes_time(action);
+  if (hold) {
+    act(SceneAction::plain(ActionKind::hold));
+    wait();
+    if (!servo_.taken()) return ended;
+    held();
+  }
+  World::Effect effect = act(action, done, components);
+  if (!effect.done && hold) act(SceneAction::plain(ActionKind::resume));
+  return effect;
+}
+
+}  // namespace osteo

@@ -1,0 +1,116 @@
+#include <chrono>
+#include <cstddef>
+#include <cstring>
+
+#include "osteo/base/error.h"
+#include "osteo/scene/rehearsal.h"
+
+namespace osteo {
+
+void apply_recorded(const Session& session, World& world) {
+  std::size_t next = 0;
+  const auto apply_until = [&](std::size_t end) {
+    for (; next < end; ++next) {
+      const VoxelChange& c = session.changes[next];
+      const PlacedBody* const b = world.owner(c.voxel);
+      if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+      b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
+    }
+  };
+  for (const RecordedAction& r : session.actions) {
+    apply_until(r.changes_before);
+    world.act(r.action);
+  }
+  apply_until(session.changes.size());
+}
+
+ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context) {
+  const auto begin = std::chrono::steady_clock::now();
+  ReplayResult result;
+  if (start.hash() != session.header.bone_hash) {
+    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
+                "give the case it was recorded on, unchanged");
+  }
+  if (session.header.haptics.hardness != (anatomy.hardness != nullptr)) {
+    throw Error(ExitCode::usage, "the session went by the hardness of the bone, which this case does not tell",
+                "the case needs its hu.vdb");
+  }
+  if (session.header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : "")) {
+    throw Error(ExitCode::corrupt, "the session watched other structures at risk than this case has",
+                "give the case it was recorded on, unchanged");
+  }
+  std::vector<DeviceSample> samples;
+  samples.reserve(session.ticks.size());
+  for (const TickRecord& t : session.ticks) samples.push_back(t.device);
+  World from_changes = start.copy();  // the second way: apply the recorded changes
+  ReplayDevice device(std::move(samples));
+  Stream stream;
+  StreamReader& reader = stream.add_reader();
+  // Dust follows from the stream, so it has to come out the same as well.
+  StreamReader* const dust_reader = session.header.dust ? &stream.add_reader() : nullptr;
+  Operation operation(std::move(start), session.header.haptics, anatomy, device, stream, session.header.rate_hz);
+  std::unique_ptr<Follower> dust;
+  if (dust_reader != nullptr)
+    dust = std::make_unique<Follower>(operation.world(), FollowerParts{false, false, true}, session.header.rate_hz, context);
+  std::vector<VoxelChange> changes(1 << 16);
+  SceneAction action;
+  const auto differ = [&](const std::string& what) {
+    if (result.difference.empty()) result.difference = what;
+  };
+  auto next = session.actions.begin();
+  const auto act = [&] {
+    if (dust) dust->drain(*dust_reader);
+    const bool scene = !next->action.is(ActionKind::hold) && !next->action.is(ActionKind::resume);
+    const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) {
+      if (dust && scene) dust->follow(operation.world(), e);
+    });
+    if (!effect.done)
+      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(static_cast<ActionKind>(next->action.kind))) +
+             "' could not be done: " + effect.message);
+    ++next;
+  };
+  for (const TickRecord& recorded : session.ticks) {
+    if (recorded.tick % 256 == 0) {
+      context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(session.ticks.size()), "replay");
+      if (dust) dust->drain(*dust_reader);
+    }
+    if (next != session.actions.end() && next->action.tick == recorded.tick) act();
+    operation.step(0);
+    TickRecord now;
+    reader.ticks.pop({&now, 1});
+    while (reader.changes.pop(changes) > 0) {
+    }
+    while (reader.actions.pop({&action, 1}) > 0) {
+    }
+    // Bytes, not numbers: the same bits or not.
+    constexpr std::size_t kRepeated = offsetof(TickRecord, work_us);
+    const bool same = std::memcmp(&now, &recorded, kRepeated) == 0;
+    if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
+    result.removed_mm3 += static_cast<double>(now.removed_mm3);
+  }
+  while (next != session.actions.end()) act();  // done in the last moment
+  result.ticks = session.ticks.size();
+  result.actions = session.actions.size();
+  apply_recorded(session, from_changes);
+  result.bone_hash = operation.world().hash();
+  if (from_changes.hash() != result.bone_hash) differ("the recorded voxel changes give another bone than the recorded poses");
+  const Follower surfaces(operation.world(), {true, false, false}, session.header.rate_hz, context);
+  result.surface_hash = surfaces.surface_hash();
+  if (dust) {
+    dust->drain(*dust_reader);
+    result.dust_hash = dust->dust()->hash();
+  }
+  result.complete = session.end.has_value();
+  if (session.end) {
+    if (session.end->ticks != result.ticks) differ("the session says it had " + std::to_string(session.end->ticks) + " ticks");
+    if (session.end->bone_hash != result.bone_hash) differ("the bone came out differently");
+    if (!session.end->surface_hash.empty() && session.end->surface_hash != result.surface_hash) differ("the surface came out differently");
+    if (session.end->dust_hash != result.dust_hash) differ("the dust came out differently");
+  }
+  result.world = std::make_shared<const World>(std::move(from_changes));
+  result.identical = result.difference.empty();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+}  // namespace osteo

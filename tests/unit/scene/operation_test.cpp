@@ -1,0 +1,272 @@
+// Scenes that are operated on: by the clock and without it, and the same again from the stream.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <thread>
+
+#include "bar.h"
+#include "osteo/bone/plates.h"
+#include "osteo/scene/rehearsal.h"
+#include "osteo/session/session_file.h"
+
+namespace osteo {
+namespace {
+
+// Circles on the bar's upper face (z = 4), at x.
+Script strokes(double x, double seconds) {
+  Script s;
+  s.axis = {0, 0.3, 0.95};
+  s.waypoints.push_back({0, {x, 0, 8}, true});
+  for (double t = 0.3; t < seconds - 0.2; t += 0.05)
+    s.waypoints.push_back({t, {x + 2 * std::cos(9 * t), 2 * std::sin(9 * t), 5.4 - 0.5 * t}, true});
+  s.waypoints.push_back({seconds, {x, 0, 9}, false});
+  return s;
+}
+
+std::filesystem::path fresh(const std::string& name) {
+  const auto path = std::filesystem::temp_directory_path() / ("osteo_operation_" + name);
+  std::filesystem::remove_all(path);
+  return path;
+}
+
+std::vector<SceneAction> at_ticks(std::vector<std::pair<std::uint64_t, SceneAction>> list) {
+  std::vector<SceneAction> actions;
+  for (auto& [tick, a] : list) {
+    a.tick = tick;
+    actions.push_back(a);
+  }
+  return actions;
+}
+
+const SawCut kCut{{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1.0};
+
+// Sawn, taken apart, the drilled piece carried away under the burr and back, plated, opened, undone.
+std::vector<SceneAction> everything() {
+  const auto mini = static_cast<std::uint32_t>(plate_index("miniplate-4")),
+             distractor = static_cast<std::uint32_t>(plate_index("distractor"));
+  return at_ticks({{200, SceneAction::suction({4, 0, 5}, 3, 40)},
+                   {400, SceneAction::saw(kCut)},
+                   {500, SceneAction::split(20)},
+                   {600, SceneAction::move(0, RigidTransform{{}, {0.5, 0, 0.3}} * rotation_about({5, 0, 0}, {0, 0, 1}, 0.2))},
+                   {700, SceneAction::attach(mini, {{}, {-4, 0, 4}}, 0, 1)},
+                   {800, SceneAction::move(1, {{}, {0.2, 0.1, 0}})},
+                   {900, SceneAction::detach(1)},
+                   {901, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
+                   {1000, SceneAction::open(2, 3)},
+                   {1100, SceneAction::irrigate({4, 0, 5}, 5, 2)},
+                   {1200, SceneAction::plain(ActionKind::undo)},
+                   {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
+                   {1301, SceneAction::split(20)},
+                   {1400, SceneAction::plain(ActionKind::undo)},
+                   {1401, SceneAction::grip(mini)},
+                   {1600, SceneAction::grip(SceneAction::kNobody)}});
+}
+
+RehearsalOptions options(const std::filesystem::path& file, ContactMethod method) {
+  RehearsalOptions o;
+  o.session_file = file;
+  o.follow = {true, true, true};
+  o.haptics.device = SpringHand::traits();
+  o.haptics.params.contact.method = method;
+  o.actions = everything();
+  return o;
+}
+
+TEST(Operation, EverythingComesOutTheSameFromTheStream) {
+  for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
+    for (const bool by_the_clock : {false, true}) {
+      const auto file = fresh("all.oss");
+      World world(test::bar(0.5, 0.3));
+      const World start = world.copy();
+      Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000), options(file, method), {});
+      RehearsalSummary s;
+      if (by_the_clock) {
+        r.start();
+        while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        s = r.stop();
+      } else {
+        s = r.run_to_end({});
+      }
+      EXPECT_EQ(r.take_refusal(), "");
+      EXPECT_GT(s.removed_mm3, 2);
+      EXPECT_NEAR(s.sawn_mm3, 80 + 56, 12);
+      ASSERT_TRUE(s.dust);
+      const Dust::Totals& d = *s.dust;
+      EXPECT_NEAR(d.added_mm3, s.removed_mm3 + s.sawn_mm3, 1e-3);
+      EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.sucked_mm3 + d.washed_mm3 + d.fallen_mm3, 1e-9);
+      EXPECT_GT(d.sucked_mm3, 0);
+      EXPECT_EQ(s.bodies, 2u);
+      const Session session = read_session(file);
+      EXPECT_GE(session.actions.size(), everything().size());
+      const ReplayResult again = replay(session, start.copy(), {}, {});
+      EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
+      EXPECT_TRUE(again.complete);
+      EXPECT_EQ(again.bone_hash, s.bone_hash);
+    }
+  }
+}
+
+TEST(Operation, NothingIsRemovedWhileTheSceneIsPrepared) {
+  const auto file = fresh("hold.oss");
+  World world(test::bar(0.25, 0));
+  Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000), options(file, ContactMethod::overlap), {});
+  r.start();
+  while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  r.stop();
+  const Session session = read_session(file);
+  bool held = false;
+  std::size_t next = 0, held_ticks = 0;
+  for (const TickRecord& t : session.ticks) {
+    for (; next < session.actions.size() && session.actions[next].action.tick == t.tick; ++next) {
+      if (session.actions[next].action.is(ActionKind::hold))
+        held = true;
+      else if (session.actions[next].action.is(ActionKind::saw) || session.actions[next].action.is(ActionKind::split) ||
+               session.actions[next].action.is(ActionKind::undo))
+        held = false;
+    }
+    EXPECT_EQ((t.flags & kHeld) != 0, held) << t.tick;
+    if (!held) continue;
+    ++held_ticks;
+    EXPECT_EQ(t.voxels_changed, 0u);
+  }
+  EXPECT_GT(held_ticks, 3u);
+}
+
+// The same strokes on bone that was cut but not moved remove the same and feel nearly the same: nobody notices that it is two pieces.
+TEST(Operation, ACutThatNobodyOpenedIsNotFelt) {
+  for (const bool split : {false, true}) {
+    static std::vector<float> whole_force;
+    static double whole_removed = 0;
+    BrickGrid bone = test::bar(0.5, 0);
+    World world(std::move(bone));
+    if (split) {
+      // Without kerf: taken apart along a plane that leaves every voxel to one side.
+      BrickGrid left = test::bar(0.5, 0);
+      BrickGrid right(left);
+      for (VoxelKey v = 0; v < left.brick_count() * 512; ++v)
+        (left.frame().world_from_index({double(left.coordinate(v).i), 0, 0}).x < 4 ? right : left).set(v, 0);
+      world = World(std::move(left));
+      HapticSetup setup;
+      setup.device = SpringHand::traits();
+      setup.params.effects.vibration = false;
+      HapticRenderer renderer(setup, {}, 1e-3);
+      Body second;
+      second.id = 1;
+      second.first_brick = static_cast<std::uint32_t>(right.brick_count());
+      second.bone = std::move(right);
+      HapticScene scene = HapticScene::of(world, renderer.setup());
+      scene.items.push_back({std::make_shared<TouchedBone>(renderer.setup(), std::make_shared<Body>(std::move(second))), {}, {}});
+      scene.make_room();
+      renderer.show(&scene);
+      ScriptedDevice device(strokes(4, 2), 1000);
+      Vec3 force{};
+      double removed = 0, worst = 0;
+      std::size_t t = 0;
+      for (; device.active(t); ++t) {
+        const auto [record, changes] = renderer.step(device.read(t, 1e-3, force));
+        force = from_floats(record.force_n);
+        removed += static_cast<double>(record.removed_mm3);
+        worst = std::max(worst, std::abs(static_cast<double>(whole_force[t]) - length(force)));
+      }
+      EXPECT_NEAR(removed / whole_removed, 1, 0.03);
+      EXPECT_LT(worst, 0.25);  // of up to 3 N, while drilling: the paths differ a little once bone has gone
+    } else {
+      HapticSetup setup;
+      setup.device = SpringHand::traits();
+      setup.params.effects.vibration = false;
+      HapticRenderer renderer(setup, world.bodies()[0].body->bone, {}, 1e-3);
+      ScriptedDevice device(strokes(4, 2), 1000);
+      Vec3 force{};
+      for (std::size_t t = 0; device.active(t); ++t) {
+        const auto [record, changes] = renderer.step(device.read(t, 1e-3, force));
+        force = from_floats(record.force_n);
+        whole_force.push_back(static_cast<float>(length(force)));
+        whole_removed += static_cast<double>(record.removed_mm3);
+      }
+    }
+  }
+}
+
+// A piece that was carried away feels where it is as it felt where it was.
+TEST(Operation, ForceGoesWithThePiece) {
+  World world(test::bar(0.5, 0));
+  const RigidTransform away = RigidTransform{{}, {30, -20, 5}} * rotation_about({1, 2, 3}, normalized({1, -1, 2}), 1.1);
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  setup.params.guard.max_rate_n_per_s = 1e9;
+  HapticRenderer here(setup, {}, 1e-3), there(setup, {}, 1e-3);
+  HapticScene scene = HapticScene::of(world, here.setup());
+  World moved = world.copy();
+  moved.act(SceneAction::move(0, away));
+  HapticScene scene2 = HapticScene::of(moved, there.setup());
+  here.show(&scene);
+  there.show(&scene2);
+  for (int t = 0; t < 200; ++t) {
+    DeviceSample a, b;
+    const Vec3 at{2 + 0.01 * t, 0.5, 5.9 - 0.004 * t}, axis = normalized({0.2, 0.1, 1});
+    a.position_mm = to_floats(at);
+    a.axis = to_floats(axis);
+    b.position_mm = to_floats(away(at));
+    b.axis = to_floats(away.rotation * axis);
+    const Vec3 f = from_floats(here.step(a).record.force_n), g = from_floats(there.step(b).record.force_n);
+    EXPECT_LT(length(away.rotation * f - g), 2e-3 + 2e-3 * length(f)) << t;
+  }
+}
+
+TEST(Operation, APlateRestsOnBone) {
+  for (const char* name : {"miniplate-4", "reconstruction-8", "distractor"}) {
+    World world(test::bar(0.5, 0.2));
+    world.act(SceneAction::grip(static_cast<std::uint32_t>(plate_index(name))));
+    HapticSetup setup;
+    setup.device = SpringHand::traits();
+    HapticRenderer renderer(setup, {}, 1e-3);
+    HapticScene scene = HapticScene::of(world, renderer.setup());
+    renderer.show(&scene);
+    SpringHand hand;
+    Vec3 force{};
+    TickRecord last;
+    // Pressed down by a hand whose goal is 2 mm below the face; samples stand out by a tenth of a millimetre.
+    for (int t = 0; t < 1500; ++t) {
+      HandGoal goal;
+      goal.position_mm = {1, 0, 8 - std::min(6.0, t * 0.01)};
+      last = renderer.step(hand.step(goal, 1e-3, force)).record;
+      force = from_floats(last.force_n);
+      EXPECT_EQ(last.voxels_changed, 0u);
+    }
+    EXPECT_NEAR(force.z, 1.6, 0.5) << name;  // 0.8 N/mm of the hand
+    EXPECT_LT(std::hypot(force.x, force.y), 0.3) << name;
+    EXPECT_NEAR(last.device.position_mm[2], 4 - last.depth_mm + 0.1F, 0.3) << name;
+    EXPECT_TRUE((last.flags & kPlateInHand) != 0);
+    EXPECT_LT(std::hypot(last.torque_n_mm[0], last.torque_n_mm[1]), 3) << name;
+  }
+}
+
+// Deeper than the bone is thick, edge on, far away, broken poses: bounded, and nothing that is not a number.
+TEST(Operation, APlateAnywhere) {
+  World world(test::bar(0.5, 0.2));
+  world.act(SceneAction::saw({{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, 7.0}));  // shells of half a millimetre are left
+  world.act(SceneAction::grip(static_cast<std::uint32_t>(plate_index("reconstruction-8"))));
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  HapticRenderer renderer(setup, {}, 1e-3);
+  HapticScene scene = HapticScene::of(world, renderer.setup());
+  renderer.show(&scene);
+  for (int t = 0; t < 3000; ++t) {
+    DeviceSample s;
+    s.position_mm = {static_cast<float>(20 * std::sin(0.01 * t)), static_cast<float>(6 * std::sin(0.013 * t)),
+                     static_cast<float>(5 * std::sin(0.007 * t))};
+    s.axis = to_floats(normalized({std::sin(0.003 * t), std::cos(0.005 * t), std::sin(0.011 * t) - 0.2}));
+    if (t % 400 == 399) s.position_mm[0] = NAN;
+    if (t % 700 == 699) s.position_mm[0] = 1e30F;
+    const auto record = renderer.step(s).record;
+    const double force = length(from_floats(record.force_n));
+    EXPECT_TRUE(std::isfinite(force));
+    EXPECT_LE(force, setup.params.guard.max_force_n * 1.001);
+    EXPECT_TRUE(std::isfinite(length(from_floats(record.torque_n_mm))));
+  }
+}
+
+}  // namespace
+}  // namespace osteo
