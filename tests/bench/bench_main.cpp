@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   if (subject == "import" || subject == "all") osteo::bench_import(context);
   if (subject == "bone" || subject == "all") osteo::bench_bone(context);
   if (subject == "haptics" || subject == "all") osteo::bench_haptics(context);
+  if (subject == "operation" || subject == "all") osteo::bench_operation(context);
   if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
 #ifdef OSTEO_BENCH_GEOMETRY
   if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
@@ -22,9 +23,9 @@ int main(int argc, char** argv) {
     return 2;
   }
 #endif
-  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" &&
+  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" && subject != "operation" &&
       subject != "haptics-fuzz") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import\n", subject.c_str());
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation\n", subject.c_str());
     return 2;
   }
   return 0;

@@ -3,20 +3,38 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/base/error.h"
+
 namespace osteo {
 
 DepthMap::DepthMap(const BrickGrid& bone) : frame_(bone.frame()) {
-  for (std::size_t a = 0; a < 3; ++a) dims_[a] = (frame_.dims[a] + kBlock - 1) / kBlock + 2;
+  int lo[3] = {0, 0, 0}, hi[3] = {-1, -1, -1};
+  for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+    const Ijk o = bone.brick_coordinate(brick);
+    const int at[3] = {o.i, o.j, o.k};
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = brick == 0 ? at[a] : std::min(lo[a], at[a]);
+      hi[a] = std::max(hi[a], at[a]);
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    first_[a] = lo[a] * 2 - 1;
+    dims_[a] = (hi[a] - lo[a] + 1) * 2 + 2;
+  }
   const std::size_t n = static_cast<std::size_t>(dims_[0]) * static_cast<std::size_t>(dims_[1]) * static_cast<std::size_t>(dims_[2]);
+  if (dims_[0] > 1024 || dims_[1] > 1024 || dims_[2] > 1024)
+    throw Error(ExitCode::failed, "the bone is too large for the fail-safe's distance map", "set \"fail_safe\" to false, or crop the case");
   nearest_.resize(n);
-  for (std::size_t b = 0; b < n; ++b) nearest_[b] = static_cast<std::int32_t>(b);
+  std::size_t number = 0;
+  for (int k = 0; k < dims_[2]; ++k)
+    for (int j = 0; j < dims_[1]; ++j)
+      for (int i = 0; i < dims_[0]; ++i) nearest_[number++] = packed(i, j, k);
   queued_.resize(n);
   for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
     const Ijk o = bone.brick_coordinate(brick);
     for (int c = 0; c < 8; ++c) {
-      const int i = o.i * 2 + (c & 1) + 1, j = o.j * 2 + (c >> 1 & 1) + 1, k = o.k * 2 + (c >> 2) + 1;
-      if (i >= dims_[0] - 1 || j >= dims_[1] - 1 || k >= dims_[2] - 1 || !is_bone(bone, i, j, k)) continue;
-      nearest_[(static_cast<std::size_t>(k) * dims_[1] + j) * dims_[0] + i] = kNowhere;
+      const int i = o.i * 2 + (c & 1) - first_[0], j = o.j * 2 + (c >> 1 & 1) - first_[1], k = o.k * 2 + (c >> 2) - first_[2];
+      if (is_bone(bone, brick, c)) nearest_[(static_cast<std::size_t>(k) * dims_[1] + j) * dims_[0] + i] = kNowhere;
     }
   }
   // From every empty block beside bone inwards. The queue holds each block at most once, so it never overflows.
@@ -28,7 +46,9 @@ DepthMap::DepthMap(const BrickGrid& bone) : frame_(bone.frame()) {
         const int b = k * layer + j * row + i;
         if (nearest_[static_cast<std::size_t>(b)] != kNowhere) continue;
         for (const int step : {-1, 1, -row, row, -layer, layer}) {
-          if (nearest_[static_cast<std::size_t>(b + step)] == b + step) push(b + step);
+          const int n0 = b + step;
+          const std::uint32_t own = packed(n0 % row, n0 % layer / row, n0 / layer);
+          if (nearest_[static_cast<std::size_t>(n0)] == own) push(n0);
         }
       }
     }
@@ -36,20 +56,16 @@ DepthMap::DepthMap(const BrickGrid& bone) : frame_(bone.frame()) {
   while (waiting_ > 0) relax(queue_[head_]);
 }
 
-bool DepthMap::is_bone(const BrickGrid& bone, int i, int j, int k) const noexcept {
-  // A block lies within one brick.
-  const int x = (i - 1) * kBlock, y = (j - 1) * kBlock, z = (k - 1) * kBlock;
-  const VoxelKey first = bone.find(x, y, z);
-  if (first == BrickGrid::kNone) return false;
+bool DepthMap::is_bone(const BrickGrid& bone, std::uint32_t brick, int octant) noexcept {
+  const float* const v = bone.values_of_brick(brick) + (octant & 1) * 4 + (octant >> 1 & 1) * 32 + (octant >> 2) * 256;
   float sum = 0;
-  for (unsigned c = 0; c < 64; ++c) sum += bone.value(first + (c & 3) + (c >> 2 & 3) * 8 + (c >> 4) * 64);
+  for (int k = 0; k < 4; ++k) {
+    for (int j = 0; j < 4; ++j) {
+      const float* const row = v + j * 8 + k * 64;
+      sum += (row[0] + row[1]) + (row[2] + row[3]);
+    }
+  }
   return sum >= 32;
-}
-
-std::int64_t DepthMap::distance2(std::int32_t a, std::int32_t b) const noexcept {
-  const int row = dims_[0], layer = dims_[0] * dims_[1];
-  const std::int64_t dz = a / layer - b / layer, dy = a % layer / row - b % layer / row, dx = a % row - b % row;
-  return dx * dx + dy * dy + dz * dz;
 }
 
 void DepthMap::push(std::int32_t block) noexcept {
@@ -64,15 +80,16 @@ void DepthMap::relax(std::int32_t block) noexcept {
   --waiting_;
   queued_[static_cast<std::size_t>(block)] = 0;
   const int row = dims_[0], layer = dims_[0] * dims_[1];
-  const std::int32_t news = nearest_[static_cast<std::size_t>(block)];
-  for (int dk = -1; dk <= 1; ++dk) {
-    for (int dj = -1; dj <= 1; ++dj) {
-      for (int di = -1; di <= 1; ++di) {
+  const std::uint32_t news = nearest_[static_cast<std::size_t>(block)];
+  const int i = block % row, j = block % layer / row, k = block / layer;
+  for (int dk = k > 0 ? -1 : 0; dk <= (k + 1 < dims_[2] ? 1 : 0); ++dk) {
+    for (int dj = j > 0 ? -1 : 0; dj <= (j + 1 < dims_[1] ? 1 : 0); ++dj) {
+      for (int di = i > 0 ? -1 : 0; di <= (i + 1 < dims_[0] ? 1 : 0); ++di) {
         const std::int32_t b = block + dk * layer + dj * row + di;
-        if (b < 0 || b >= static_cast<std::int32_t>(nearest_.size())) continue;
-        std::int32_t& known = nearest_[static_cast<std::size_t>(b)];
-        if (known == b) continue;  // empty itself
-        if (known != kNowhere && distance2(b, known) <= distance2(b, news)) continue;
+        const std::uint32_t own = packed(i + di, j + dj, k + dk);
+        std::uint32_t& known = nearest_[static_cast<std::size_t>(b)];
+        if (known == own) continue;  // empty itself
+        if (known != kNowhere && distance2(own, known) <= distance2(own, news)) continue;
         known = news;
         push(b);
       }
@@ -81,16 +98,17 @@ void DepthMap::relax(std::int32_t block) noexcept {
 }
 
 void DepthMap::update(const BrickGrid& bone, std::span<const VoxelKey> changed, int budget) noexcept {
-  std::int32_t last = kNowhere;
+  std::int32_t last = -1;
   const int row = dims_[0], layer = dims_[0] * dims_[1];
   for (const VoxelKey v : changed) {
     const Ijk c = bone.coordinate(v);
-    const int i = c.i / kBlock + 1, j = c.j / kBlock + 1, k = c.k / kBlock + 1;
+    const int i = c.i / kBlock - first_[0], j = c.j / kBlock - first_[1], k = c.k / kBlock - first_[2];
     const std::int32_t b = k * layer + j * row + i;
-    if (b == last || nearest_[static_cast<std::size_t>(b)] == b) continue;
+    const std::uint32_t own = packed(i, j, k);
+    if (b == last || nearest_[static_cast<std::size_t>(b)] == own) continue;
     last = b;
-    if (is_bone(bone, i, j, k)) continue;
-    nearest_[static_cast<std::size_t>(b)] = b;
+    if (is_bone(bone, v / BrickGrid::kVoxels, (c.i >> 2 & 1) | (c.j >> 2 & 1) << 1 | (c.k >> 2 & 1) << 2)) continue;
+    nearest_[static_cast<std::size_t>(b)] = own;
     push(b);
   }
   for (int n = 0; n < budget && waiting_ > 0; ++n) relax(queue_[head_]);
@@ -100,14 +118,16 @@ DepthMap::Answer DepthMap::at(Vec3 world_mm) const noexcept {
   const Vec3 x = frame_.index_from_world(world_mm);
   int at[3];
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!(x[a] >= -0.5 && x[a] <= frame_.dims[a] - 0.5)) return {};
-    at[a] = static_cast<int>((x[a] + 0.5) / kBlock) + 1;
+    const double block = (x[a] + 0.5) / kBlock - first_[a];
+    if (!(block >= 0 && block < dims_[a])) return {};
+    at[a] = static_cast<int>(block);
   }
-  const std::int32_t b = (at[2] * dims_[1] + at[1]) * dims_[0] + at[0], out = nearest_[static_cast<std::size_t>(b)];
-  if (out == b || out == kNowhere) return {};
-  const int row = dims_[0], layer = dims_[0] * dims_[1];
-  const auto middle = [](int block) { return (block - 1) * kBlock + 0.5 * (kBlock - 1); };
-  const Vec3 goal{middle(out % row), middle(out % layer / row), middle(out / layer)};
+  const std::uint32_t out = nearest_[static_cast<std::size_t>((at[2] * dims_[1] + at[1]) * dims_[0] + at[0])];
+  if (out == packed(at[0], at[1], at[2]) || out == kNowhere) return {};
+  const auto middle = [&](std::size_t a) {
+    return (static_cast<int>(out >> (10 * a) & 1023) + first_[a]) * kBlock + 0.5 * (kBlock - 1);
+  };
+  const Vec3 goal{middle(0), middle(1), middle(2)};
   const Vec3 way = frame_.direction * ((goal - x) * frame_.spacing_mm.x);
   const double distance = length(way);
   if (!(distance > 0)) return {};

@@ -1,6 +1,7 @@
 #include "osteo/bone/live_components.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace osteo {
 namespace {
@@ -33,7 +34,7 @@ LiveComponents::LiveComponents(const BrickGrid& bone, Connectivity connectivity)
   update();
 }
 
-LiveComponents::LiveComponents(const BrickGrid& piece, const LiveComponents& whole, const PieceOrigin& origin)
+LiveComponents::LiveComponents(const BrickGrid& piece, LiveComponents& whole, const PieceOrigin& origin)
     : bone_(&piece),
       steps_(whole.steps_),
       bricks_(piece.brick_count()),
@@ -46,11 +47,19 @@ LiveComponents::LiveComponents(const BrickGrid& piece, const LiveComponents& who
       mark_brick(b);
       continue;
     }
-    bricks_[b] = whole.bricks_[origin.brick[b]];
+    bricks_[b] = std::exchange(whole.bricks_[origin.brick[b]], {});
     for (Link& l : bricks_[b].links) l.brick = here[l.brick];
   }
   if (dirty_.empty()) join_parts();
   update();
+}
+
+void LiveComponents::take_back(LiveComponents& piece, const PieceOrigin& origin) {
+  for (std::uint32_t b = 0; b < piece.bricks_.size(); ++b) {
+    if (origin.unchanged[b] == 0) continue;
+    Brick& brick = bricks_[origin.brick[b]] = std::exchange(piece.bricks_[b], {});
+    for (Link& l : brick.links) l.brick = origin.brick[l.brick];
+  }
 }
 
 void LiveComponents::mark_brick(std::uint32_t b) {

@@ -1,6 +1,7 @@
 #include "osteo/bone/live_surface.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "osteo/base/files.h"
 #include "osteo/base/parallel.h"
@@ -16,14 +17,21 @@ LiveSurface::LiveSurface(const BrickGrid& bone, const Context& context)
   });
 }
 
-LiveSurface::LiveSurface(const BrickGrid& piece, const LiveSurface& whole, const PieceOrigin& origin)
+LiveSurface::LiveSurface(const BrickGrid& piece, LiveSurface& whole, const PieceOrigin& origin)
     : bone_(&piece), patches_(piece.brick_count()), is_dirty_(piece.brick_count()) {
   for (std::uint32_t b = 0; b < patches_.size(); ++b) {
     if (origin.unchanged[b] != 0) {
-      patches_[b] = whole.patches_[origin.brick[b]];
+      patches_[b] = std::exchange(whole.patches_[origin.brick[b]], {});
     } else {
-      extract_patch(piece, b, 0.5F, patches_[b]);
+      dirty_.push_back(b);
     }
+  }
+  update();
+}
+
+void LiveSurface::take_back(LiveSurface& piece, const PieceOrigin& origin) {
+  for (std::uint32_t b = 0; b < origin.brick.size(); ++b) {
+    if (origin.unchanged[b] != 0) patches_[origin.brick[b]] = std::exchange(piece.patches_[b], {});
   }
 }
 
@@ -56,10 +64,11 @@ std::span<const std::uint32_t> LiveSurface::update() {
   done_.swap(dirty_);
   dirty_.clear();
   std::sort(done_.begin(), done_.end());
-  for (const std::uint32_t b : done_) {
-    is_dirty_[b] = false;
-    extract_patch(*bone_, b, 0.5F, patches_[b]);
-  }
+  for (const std::uint32_t b : done_) is_dirty_[b] = false;
+  // By threads only where it is worth waking them: an edit changes a few bricks, a split thousands.
+  parallel_for(done_.size(), done_.size() > 200 ? 32 : done_.size() + 1, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) extract_patch(*bone_, done_[i], 0.5F, patches_[done_[i]]);
+  });
   return done_;
 }
 

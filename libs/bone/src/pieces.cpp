@@ -92,20 +92,22 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
   std::vector<std::vector<Ijk>> bricks(count);
   std::vector<std::uint32_t> in_brick;
   std::vector<std::pair<VoxelKey, std::uint32_t>> apart;  // voxels of bricks where parts meet, and whose they are
+  const std::vector<std::uint32_t> near = around;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-    if (around[b] == 0) continue;
-    split.changed_bricks.push_back(b);
+    if (near[b] == 0) continue;
     in_brick.clear();
+    std::uint32_t whose = kNobody;
     for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
       const VoxelKey key = b * BrickGrid::kVoxels + v;
       const float density = bone.value(key);
       if (density <= 0) continue;
-      std::uint32_t piece = around[b];
+      std::uint32_t piece = near[b];
       if (piece == kSeveral) {
         const std::uint32_t own = components.component_of(key);
         piece = own == LiveComponents::kNone ? nearest_owner(bone, components, piece_of, key) : piece_of[own];
         apart.emplace_back(key, piece);
       }
+      whose = both(whose, piece);
       if (piece == kCrumb) {
         split.crumbs_mm3 += static_cast<double>(density) * voxel_mm3;
         split.loose.emplace_back(key, density);
@@ -114,6 +116,9 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
       }
     }
     for (const std::uint32_t p : in_brick) bricks[p].push_back(bone.brick_coordinate(b));
+    // From now on: whose the brick is after all.
+    around[b] = whose;
+    if (whose != 0 && whose != kNobody) split.changed_bricks.push_back(b);
   }
   split.pieces[0].bone = BrickGrid(bone);
   for (const std::uint32_t b : split.changed_bricks) {
@@ -127,7 +132,7 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
       const std::uint32_t from = bone.find_brick(o.i, o.j, o.k);
       piece.origin.brick.push_back(from);
       bool unchanged = true;
-      for_neighbours(bone, from, [&](std::uint32_t n) { unchanged = unchanged && around[n] == p; });
+      for_neighbours(bone, from, [&](std::uint32_t n) { unchanged = unchanged && both(around[n], p) == p; });
       piece.origin.unchanged.push_back(unchanged ? 1 : 0);
       if (around[from] != p) continue;
       for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
@@ -142,7 +147,6 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
     to.set(p == 0 ? key : to.find(c.i, c.j, c.k), bone.value(key));
   }
   for (std::uint32_t p = 0; p < count; ++p) {
-    split.pieces[p].volume_mm3 = split.pieces[p].bone.sum() * voxel_mm3;
     split.pieces[p].solid = found[component_of_piece[p]];
   }
   return split;

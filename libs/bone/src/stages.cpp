@@ -104,7 +104,7 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
     nlohmann::ordered_json inertia = nlohmann::ordered_json::array();
     // About the centre, for a density of 1 g/cm3 where bone is whole: g mm2.
     for (const double i : piece.solid.inertia_mm2) inertia.push_back(i * voxel / 1000);
-    j["pieces"].push_back({{"volume_mm3", piece.volume_mm3},
+    j["pieces"].push_back({{"volume_mm3", piece.volume_mm3()},
                            {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
                            {"inertia_g_mm2_at_1_g_per_cm3", inertia},
                            {"moved_mm", {away.x, away.y, away.z}}});
@@ -115,7 +115,7 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
     for (const auto& t : mesh.triangles) all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   context.report("pieces", static_cast<std::int64_t>(split.pieces.size()));
-  context.report("largest_mm3", split.pieces.front().volume_mm3);
+  context.report("largest_mm3", split.pieces.front().volume_mm3());
   context.report("crumbs", static_cast<std::int64_t>(split.crumbs));
   context.report("crumbs_mm3", split.crumbs_mm3);
   SparseGrid kept;

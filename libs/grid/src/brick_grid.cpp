@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "osteo/base/files.h"
+#include "osteo/base/parallel.h"
 
 namespace osteo {
 
@@ -29,7 +30,9 @@ BrickGrid::BrickGrid(const BrickGrid& other)
       table_(other.table_),
       origins_(other.origins_),
       values_(std::make_unique_for_overwrite<float[]>(other.origins_.size() * kVoxels)) {
-  for (std::size_t v = 0; v < origins_.size() * kVoxels; ++v) values_[v] = other.value(static_cast<VoxelKey>(v));
+  parallel_for(origins_.size(), 2048, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin * kVoxels; v < end * kVoxels; ++v) values_[v] = other.value(static_cast<VoxelKey>(v));
+  });
 }
 
 void BrickGrid::read_block(Ijk lo, std::array<int, 3> n, float* out) const {

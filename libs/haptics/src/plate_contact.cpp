@@ -40,7 +40,7 @@ ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& worl
     if (!item.bone->near(own.shift_mm, plate.radius_mm)) continue;
     const BrickGrid& bone = item.bone->bone();
     const Frame& frame = bone.frame();
-    const double h = frame.spacing_mm.x, step = 0.5;
+    const double h = frame.spacing_mm.x, step = 1;
     const Mat3 to_index = transposed(frame.direction);
     for (const PlateSample& s : plate.samples) {
       Vec3 x = frame.index_from_world(own(s.at_mm));
@@ -53,7 +53,11 @@ ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& worl
         x += back;
         const float now = linear(bone, x);
         if (now < 0.5F) {
-          way -= step * static_cast<double>((0.5F - now) / (before - now));
+          // Between here and half a step back, or in the half before.
+          const float middle = linear(bone, x - back * 0.5);
+          const bool last_half = middle >= 0.5F;
+          const float above = last_half ? middle : before, below = last_half ? now : middle;
+          way -= 0.5 * step * (static_cast<double>((0.5F - below) / (above - below)) + (last_half ? 0 : 1));
           out = true;
           break;
         }

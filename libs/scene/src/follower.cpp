@@ -173,31 +173,58 @@ std::size_t Follower::drain(StreamReader& reader) {
 }
 
 void Follower::follow(const World& world, const World::Effect& effect) {
-  // Pieces first: they are made from what is known of the whole before it lost them.
+  // Bricks that went from one body to another as they are: what is known of them goes with them.
+  std::map<std::uint32_t, std::vector<std::uint8_t>> known;
+  const auto note = [&](std::uint32_t body, const PieceOrigin& origin) {
+    Followed& whole = *bodies_.at(body);
+    auto& bricks = known[body];
+    bricks.resize(whole.body->bone.brick_count());
+    for (std::size_t b = 0; b < origin.brick.size(); ++b) {
+      if (origin.unchanged[b] == 0) continue;
+      bricks[origin.brick[b]] = 1;
+      if (whole.surface) whole.changed_bricks.insert(origin.brick[b]);
+    }
+  };
   for (const auto& made : effect.made) {
     const PlacedBody& placed = *world.find(made.body);
-    const Followed& whole = *bodies_.at(made.from);
+    Followed& whole = *bodies_.at(made.from);
     auto f = std::make_unique<Followed>();
     f->body = placed.body;
+    f->from = made.from;
+    f->origin = made.origin;
     const BrickGrid& bone = placed.body->bone;
     if (parts_.surface) f->surface = std::make_unique<LiveSurface>(bone, *whole.surface, made.origin);
     if (parts_.pieces) f->components = std::make_unique<LiveComponents>(bone, *whole.components, made.origin);
     for (std::uint32_t b = 0; b < bone.brick_count() && parts_.surface; ++b) f->changed_bricks.insert(f->changed_bricks.end(), b);
+    note(made.from, made.origin);
     bodies_.emplace(made.body, std::move(f));
   }
-  for (const std::uint32_t id : effect.gone) bodies_.erase(id);
+  for (const std::uint32_t id : effect.gone) {
+    Followed& piece = *bodies_.at(id);
+    Followed& whole = *bodies_.at(piece.from);
+    if (whole.surface) whole.surface->take_back(*piece.surface, piece.origin);
+    if (whole.components) whole.components->take_back(*piece.components, piece.origin);
+    note(piece.from, piece.origin);
+    bodies_.erase(id);
+  }
   for (const auto& changed : effect.changed) {
     Followed& f = *bodies_.at(changed.body);
     f.body = world.find(changed.body)->body;
     const BrickGrid& bone = f.body->bone;
+    const auto& skip = known[changed.body];
+    const auto unknown = [&](std::uint32_t b) { return skip.empty() || skip[b] == 0; };
     if (f.surface) {
       f.surface->rebind(bone);
-      for (const std::uint32_t b : changed.bricks) f.surface->mark_brick(b);
+      for (const std::uint32_t b : changed.bricks) {
+        if (unknown(b)) f.surface->mark_brick(b);
+      }
       for (const std::uint32_t b : f.surface->update()) f.changed_bricks.insert(b);
     }
     if (f.components) {
       f.components->rebind(bone);
-      for (const std::uint32_t b : changed.bricks) f.components->mark_brick(b);
+      for (const std::uint32_t b : changed.bricks) {
+        if (unknown(b)) f.components->mark_brick(b);
+      }
       f.components->update();
     }
   }

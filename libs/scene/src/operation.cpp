@@ -1,6 +1,7 @@
 #include "osteo/scene/operation.h"
 
 #include <chrono>
+#include <future>
 #include <thread>
 
 namespace osteo {
@@ -22,11 +23,10 @@ Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anato
 }
 
 // Only when nothing posted before waits: the scene before the last is then nobody's any more.
-void Operation::hand_over(const SceneAction& action, bool changes_scene) {
+void Operation::hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene) {
   handover_ = {action, nullptr, world_.held()};
-  if (changes_scene) {
-    auto next = std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup(), scene_.get()));
-    old_scene_ = std::exchange(scene_, std::move(next));
+  if (scene) {
+    old_scene_ = std::exchange(scene_, std::move(scene));
     handover_.scene = scene_.get();
   }
   servo_.post(&handover_);
@@ -35,8 +35,17 @@ void Operation::hand_over(const SceneAction& action, bool changes_scene) {
 World::Effect Operation::act(const SceneAction& action, const Done& done, const World::ComponentsOf& components) {
   World::Effect effect = world_.act(action, components);
   if (!effect.done) return effect;
-  if (done) done(effect);
-  hand_over(action, changes_what_is_touched(action));
+  // What the servo needs and what its followers need, side by side.
+  const auto scene_of = [&] { return std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup(), scene_.get())); };
+  std::unique_ptr<HapticScene> scene;
+  if (changes_what_is_touched(action)) {
+    auto beside = std::async(takes_time(action) && done ? std::launch::async : std::launch::deferred, scene_of);
+    if (done) done(effect);
+    scene = beside.get();
+  } else if (done) {
+    done(effect);
+  }
+  hand_over(action, std::move(scene));
   return effect;
 }
 

@@ -108,7 +108,7 @@ void Rehearsal::follow() {
     if (action && running()) {
       perform(*action, true);
     } else {
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
 }

@@ -27,12 +27,12 @@ TEST(Saw, RemovesTheKerfAndPartsTheBone) {
       const Split split = split_bone(bone, 1);
       ASSERT_EQ(split.pieces.size(), 2u);
       // 15.9 and 11.9 mm long.
-      EXPECT_NEAR(split.pieces[0].volume_mm3, 15.9 * 80, 0.03 * 1272);
-      EXPECT_NEAR(split.pieces[1].volume_mm3, 11.9 * 80, 0.03 * 952);
+      EXPECT_NEAR(split.pieces[0].volume_mm3(), 15.9 * 80, 0.03 * 1272);
+      EXPECT_NEAR(split.pieces[1].volume_mm3(), 11.9 * 80, 0.03 * 952);
       EXPECT_NEAR(split.pieces[0].solid.centre_mm.x, -15 + 15.9 / 2, 0.15);
       EXPECT_NEAR(split.pieces[1].solid.centre_mm.x, 15 - 11.9 / 2, 0.15);
       // Nothing is lost.
-      EXPECT_NEAR(split.pieces[0].volume_mm3 + split.pieces[1].volume_mm3 + split.crumbs_mm3, bone.sum() * h * h * h, 1e-3);
+      EXPECT_NEAR(split.pieces[0].volume_mm3() + split.pieces[1].volume_mm3() + split.crumbs_mm3, bone.sum() * h * h * h, 1e-3);
       // Two closed surfaces.
       for (const Piece& p : split.pieces) EXPECT_TRUE(is_closed(soup_of(surface_nets(p.bone).mesh)));
     }

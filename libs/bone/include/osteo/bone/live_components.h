@@ -28,8 +28,11 @@ class LiveComponents {
   /// Labels everything. The bone must outlive this.
   explicit LiveComponents(const BrickGrid& bone, Connectivity connectivity = Connectivity::face);
 
-  /// A piece of a bone whose labels are known: made from them in a tenth of the time. Equals the labelling of the piece.
-  LiveComponents(const BrickGrid& piece, const LiveComponents& whole, const PieceOrigin& origin);
+  /// A piece of a bone whose labels are known: takes over those of bricks that went to it as they were, which the whole then counts as
+  /// empty. Equals the labelling of the piece.
+  LiveComponents(const BrickGrid& piece, LiveComponents& whole, const PieceOrigin& origin);
+  /// The other way round: a piece is part of the whole again.
+  void take_back(LiveComponents& piece, const PieceOrigin& origin);
   /// From now on reads another grid of the same bricks; mark what differs.
   void rebind(const BrickGrid& bone) { bone_ = &bone; }
 

@@ -15,8 +15,11 @@ class LiveSurface {
   /// Extracts every brick. The bone must outlive this.
   LiveSurface(const BrickGrid& bone, const Context& context);
 
-  /// A piece of a bone whose surface is known: only where they differ is it made anew. `whole` as it was before the piece was taken out.
-  LiveSurface(const BrickGrid& piece, const LiveSurface& whole, const PieceOrigin& origin);
+  /// A piece of a bone whose surface is known: takes over what went to it as it was, where the whole then has none; the rest is made. `whole`
+  /// as it was before the piece was taken out.
+  LiveSurface(const BrickGrid& piece, LiveSurface& whole, const PieceOrigin& origin);
+  /// The other way round: a piece is part of the whole again.
+  void take_back(LiveSurface& piece, const PieceOrigin& origin);
   /// From now on reads another grid of the same bricks; mark what differs.
   void rebind(const BrickGrid& bone) { bone_ = &bone; }
 

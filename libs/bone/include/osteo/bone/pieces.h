@@ -12,8 +12,8 @@ namespace osteo {
 struct Piece {
   BrickGrid bone;                   ///< the first piece keeps all bricks of the whole, and so its voxels their names; others only what they hold
   LiveComponents::Component solid;  ///< of the whole: voxels, mass (sum of densities), centre, inertia
-  double volume_mm3 = 0;            ///< of all its density
   PieceOrigin origin;               ///< empty for the first
+  [[nodiscard]] double volume_mm3() const { return bone.sum() * bone.frame().voxel_volume_mm3(); }  ///< of all its density
 };
 
 struct Split {

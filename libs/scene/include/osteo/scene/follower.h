@@ -64,6 +64,8 @@ class Follower {
     std::unique_ptr<LiveSurface> surface;
     std::unique_ptr<LiveComponents> components;
     std::set<std::uint32_t> changed_bricks;
+    std::uint32_t from = SceneAction::kNobody;  // a piece of that body, and how
+    PieceOrigin origin;
   };
   // A body as of the tick that the dust has reached: servo and scene may be farther.
   struct Dusty {

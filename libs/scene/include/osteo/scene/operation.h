@@ -32,7 +32,7 @@ class Operation {
                          const Done& done = {}, const World::ComponentsOf& components = {});
 
  private:
-  void hand_over(const SceneAction& action, bool changes_scene);
+  void hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene);
 
   World world_;
   HapticRenderer renderer_;
