@@ -42,7 +42,7 @@ void latency(const BrickGrid& bone, const Context& context) {
   for (const int diameter : {4, 6}) {
     for (const FollowerParts parts : {FollowerParts{true, false, false}, FollowerParts{true, true, false}, FollowerParts{true, true, true}}) {
       const int tool = burr_index(BurrKind::cutting, diameter);
-      ScriptedDevice device(make_default_script(bone, true, tool, 12), 1000);
+      ScriptedDevice device(make_default_script(World(BrickGrid(bone)), true, tool, 12), 1000);
       HapticSetup setup;
       setup.device = device.traits();
       Stream stream;
@@ -105,7 +105,7 @@ void pieces(const BrickGrid& bone, const Context& context) {
   std::printf("\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| action | ms, five runs |\n|---|---|\n");
   std::map<std::string, std::vector<std::uint64_t>> held;
   for (int run = 0; run < 5; ++run) {
-    Script script = make_default_script(bone, true, burr_index(BurrKind::cutting, 4), 3);
+    Script script = make_default_script(World(BrickGrid(bone)), true, burr_index(BurrKind::cutting, 4), 3);
     RehearsalOptions o;
     o.follow = {true, true, false};
     o.haptics.device = SpringHand::traits();
@@ -139,7 +139,7 @@ void plates(const BrickGrid& bone) {
   setup.device = SpringHand::traits();
   const HapticScene scene = HapticScene::of(world, setup);
   // On the side of the head.
-  const Vec3 at = make_default_script(bone, true, 3, 5).waypoints[1].at_mm;
+  const Vec3 at = make_default_script(World(BrickGrid(bone)), true, 3, 5).waypoints[1].at_mm;
   for (const PlateModel& plate : plate_library()) {
     for (const int count : {100, 600, 2000}) {
       const PlateInHand hand(plate, count);

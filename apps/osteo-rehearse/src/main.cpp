@@ -67,11 +67,11 @@ class Hands {
   std::unique_ptr<FootPedal> pedal_;
 };
 
-Vec3 in_front_of(const BrickGrid& bone, int tool) {
+Vec3 in_front_of(const World& world, int tool) {
   try {
-    return make_default_script(bone, true, tool, 10).waypoints.front().at_mm;
+    return make_default_script(world, true, tool, 10).waypoints.front().at_mm;
   } catch (const Error&) {
-    return bone.frame().centre_mm();  // no bone on the left
+    return world.bodies().front().body->bone.frame().centre_mm();  // no bone on the left
   }
 }
 
@@ -139,7 +139,7 @@ struct WindowCommand {
       options.anatomy = anatomy_of(the_case, options.haptics, io.context);
       World world = world_at_begin(session, the_case, options.anatomy);
       // In front of the bone on the patient's left, where the window looks.
-      auto device = hands.make(in_front_of(world.bodies().front().body->bone, tool), tool);
+      auto device = hands.make(in_front_of(world, tool), tool);
       options.haptics.device = device->traits();
       rehearsal = std::make_unique<Rehearsal>(std::move(world), std::move(device), options, io.context);
       rehearsal->start();

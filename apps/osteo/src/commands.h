@@ -203,10 +203,12 @@ struct SceneCommand {
   struct Params {
     std::string settings;
     ContactMethod contact = ContactMethod::overlap;
+    bool dust = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"contact", "how the burr feels bone"}, p.contact);
+    visit({"dust", "with bone dust"}, p.dust);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
@@ -222,6 +224,19 @@ struct ReplayCommand {
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
     visit({"surface_out", "also write the surface at the end of the session (.ply, .stl, ...)"}, p.surface_out);
     visit({"bone_out", "also write the bone at the end of the session (.vdb)"}, p.bone_out);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct PlanCommand {
+  struct Params {
+    std::string out;
+    std::string case_folder;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for the plan (empty: SESSION/plan; also -o)"}, p.out);
+    visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

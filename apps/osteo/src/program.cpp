@@ -60,6 +60,7 @@ cli::Program make_osteo_program() {
   p.add<RunCommand>();
   p.add<PrepareCommand>();
   p.add<SceneCommand>();
+  p.add<PlanCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
   p.add<ExportCommand>();

@@ -16,6 +16,7 @@
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/scene/case.h"
+#include "osteo/scene/plan.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/scene/session_folder.h"
 #include "osteo/session/export.h"
@@ -83,7 +84,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
                                  : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy);
-  const Script script = p.script.empty() ? make_default_script(world.bodies().front().body->bone, p.side == Side::left, tool, p.seconds)
+  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds)
                                          : load_script(p.script);
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
@@ -213,6 +214,38 @@ int ExportCommand::run(const Params&, cli::Invocation& io) {
   return 0;
 }
 
+cli::CommandInfo PlanCommand::info() {
+  return {"plan",
+          "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
+          "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below its underside; a picture "
+          "too.",
+          {{"session", "a session folder"}},
+          "osteo plan SESSION -o plan"};
+}
+
+int PlanCommand::run(const Params& p, cli::Invocation& io) {
+  const SessionFolder session = open_session_folder(io.arguments[0], p.case_folder);
+  const Case the_case = load_case(session.case_folder);
+  const World world = world_at_end(session, the_case, {});
+  const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
+  const std::string text = write_plan(world, folder, io.context);
+  Follower follower(world, {true, false, false}, 1000, io.context);
+  Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
+  for (const auto& q : surface_of(world, io.context).points_mm) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], static_cast<double>(q[a]));
+      hi[a] = std::max(hi[a], static_cast<double>(q[a]));
+    }
+  }
+  const WorldPicture view{(lo + hi) * 0.5, 0.5 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
+  save_picture(draw_world(world, follower, nullptr, view), folder / "plan.png");
+  io.end_progress();
+  if (io.common.json) io.out << text;
+  if (!io.common.quiet)
+    io.err << world.bodies().size() << " pieces and " << world.fixtures().size() << " plates: " << folder.string() << '\n';
+  return 0;
+}
+
 cli::CommandInfo SceneCommand::info() {
   return {"scene",
           "what a rehearsal of a case will build, and what each part costs",
@@ -235,10 +268,17 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
                           {"made_in_s", std::round(static_cast<double>(monotonic_ns() - begin) / 1e7) / 100},
                           {"kept_up_to_date_by", thread}});
   };
-  BrickGrid bone;
-  timed("bone", "servo", [&] {
-    bone = to_bricks(the_case.bone);
-    return bone.memory_bytes();
+  // Of all bodies together: a case with a finer region has two.
+  const auto over_bodies = [](const World& w, auto&& bytes) {
+    std::size_t sum = 0;
+    for (const PlacedBody& b : w.bodies()) sum += bytes(b.body->bone);
+    return sum;
+  };
+  std::optional<World> world;
+  const bool region = the_case.files.contains("region");
+  timed(region ? "bone, with its finer region" : "bone", "servo", [&] {
+    world = world_of(the_case, {});
+    return over_bodies(*world, [](const BrickGrid& b) { return b.memory_bytes(); });
   });
   HapticSetup setup;
   setup.device = SpringHand::traits();
@@ -251,25 +291,36 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
       return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
     });
   }
-  if (setup.params.effects.fail_safe) timed("distance map", "servo", [&] { return DepthMap(bone).memory_bytes(); });
+  if (setup.params.effects.fail_safe)
+    timed("distance map", "servo", [&] { return over_bodies(*world, [](const BrickGrid& b) { return DepthMap(b).memory_bytes(); }); });
   timed("surface", "follower", [&] {
-    const LiveSurface surface(bone, io.context);
-    std::size_t bytes = 0;
-    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-      const SurfacePatch& patch = surface.patch(b);
-      bytes += sizeof patch + patch.memory_bytes();
-    }
-    return bytes;
+    return over_bodies(*world, [&](const BrickGrid& bone) {
+      const LiveSurface surface(bone, io.context);
+      std::size_t bytes = 0;
+      for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+        const SurfacePatch& patch = surface.patch(b);
+        bytes += sizeof patch + patch.memory_bytes();
+      }
+      return bytes;
+    });
   });
-  timed("pieces (window, or --pieces)", "follower", [&] { return LiveComponents(bone).memory_bytes(); });
+  timed("pieces (window, or --pieces)", "follower",
+        [&] { return over_bodies(*world, [](const BrickGrid& b) { return LiveComponents(b).memory_bytes(); }); });
+  if (p.dust) {
+    timed("bone dust (a copy of the bone; more where it lies)", "follower",
+          [&] { return over_bodies(*world, [](const BrickGrid& b) { return BrickGrid(b).memory_bytes(); }); });
+  }
   std::unique_ptr<HapticRenderer> renderer;
+  HapticScene touched;
   timed("haptic renderer: " + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(setup.params.contact.method)]), "servo",
         [&] {
-          renderer = std::make_unique<HapticRenderer>(setup, bone, anatomy, 1e-3);
-          return std::size_t{0};
+          renderer = std::make_unique<HapticRenderer>(setup, anatomy, 1e-3);
+          touched = HapticScene::of(*world, renderer->setup());
+          renderer->show(&touched);
+          return touched.changes.size() * sizeof(VoxelChange);
         });
   // A few seconds of drilling, without a clock.
-  Script script = make_default_script(bone, true, burr_index(BurrKind::cutting, 4), 5);
+  Script script = make_default_script(*world, true, burr_index(BurrKind::cutting, 4), 5);
   ScriptedDevice device(std::move(script), 1000);
   Histogram ticks;
   Vec3 force{};
@@ -292,7 +343,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   }
   for (const auto& part : j["parts"]) {
     char line[160];
-    std::snprintf(line, sizeof line, "%-34s %8.2f MB  made in %5.2f s  %s\n", part["part"].get<std::string>().c_str(),
+    std::snprintf(line, sizeof line, "%-50s %8.2f MB  made in %5.2f s  %s\n", part["part"].get<std::string>().c_str(),
                   part["memory_mb"].get<double>(), part["made_in_s"].get<double>(), part["kept_up_to_date_by"].get<std::string>().c_str());
     io.out << line;
   }

@@ -382,6 +382,12 @@ std::string World::hash() const {
   return h.hex();
 }
 
+float World::nearest(Vec3 world_mm) const {
+  float most = 0;
+  for (const PlacedBody& b : bodies_) most = std::max(most, b.body->bone.nearest(b.world_from_body.inverse()(world_mm)));
+  return most;
+}
+
 double World::volume_mm3() const {
   double sum = 0;
   for (const PlacedBody& b : bodies_) sum += b.body->bone.sum() * b.body->bone.frame().voxel_volume_mm3();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
@@ -59,12 +60,12 @@ struct AxisMap {
   std::vector<std::array<float, 4>> slope;   // of the change across the sub-voxel
 };
 
-AxisMap make_axis(int ct_dim, double ct_spacing, int out_dim, double out_spacing) {
+AxisMap make_axis(int ct_dim, double ct_spacing, int out_first, int out_dim, double out_spacing) {
   AxisMap m;
   m.sub = std::max(1, static_cast<int>(std::ceil(out_spacing / ct_spacing - 1e-6)));
   const double h = out_spacing / m.sub;
   for (int s = 0; s < out_dim * m.sub; ++s) {
-    const double x = std::clamp((-0.5 * ct_spacing + (s + 0.5) * h) / ct_spacing, -0.5, ct_dim - 0.5);
+    const double x = std::clamp((-0.5 * ct_spacing + (out_first * m.sub + s + 0.5) * h) / ct_spacing, -0.5, ct_dim - 0.5);
     const int i = static_cast<int>(std::floor(x));
     const double t = x - i, per_mm = h / ct_spacing;
     m.first.push_back(i - 1);
@@ -91,8 +92,11 @@ class Resampler {
     for (std::size_t a = 0; a < 3; ++a) {
       const double extent = ct.frame.dims[a] * ct.frame.spacing_mm[a];
       frame_.dims[a] = std::max(1, static_cast<int>(std::ceil(extent / h_ - 1e-6)));
-      axis_[a] = make_axis(ct.frame.dims[a], ct.frame.spacing_mm[a], frame_.dims[a], h_);
-      first[a] = -0.5 + 0.5 * h_ / ct.frame.spacing_mm[a];
+    }
+    if (boxed(p)) take_box(p);
+    for (std::size_t a = 0; a < 3; ++a) {
+      axis_[a] = make_axis(ct.frame.dims[a], ct.frame.spacing_mm[a], first_[a], frame_.dims[a], h_);
+      first[a] = -0.5 + (0.5 + first_[a]) * h_ / ct.frame.spacing_mm[a];
     }
     frame_.origin_mm = ct.frame.world_from_index(first);
     find_occupied_blocks();
@@ -182,13 +186,36 @@ class Resampler {
     Vec3 index;
     for (std::size_t a = 0; a < 3; ++a) {
       const double spacing = ct_.frame.spacing_mm[a];
-      index[a] = (-0.5 * spacing + (v[a] + 0.5) * h_) / spacing;
+      index[a] = (-0.5 * spacing + (first_[a] + v[a] + 0.5) * h_) / spacing;
     }
     return static_cast<float>(std::floor(sample_linear(ct_, index) + 0.5));
   }
 
+  [[nodiscard]] static bool boxed(const ResampleParams& p) { return p.box_mm[0] > 0 && p.box_mm[1] > 0 && p.box_mm[2] > 0; }
+
  private:
   static constexpr int kBlock = 4;
+
+  // The box in output voxels, between faces that both grids have.
+  void take_box(const ResampleParams& p) {
+    int step = 0;
+    for (int n = 1; n <= 64 && step == 0; ++n) {
+      const double fine = n * p.align_mm / h_;
+      if (std::abs(fine - std::round(fine)) < 1e-6) step = static_cast<int>(std::lround(fine));
+    }
+    if (step == 0)
+      throw Error(ExitCode::usage, "no whole number of voxels of " + format_number(h_) + " mm fills voxels of " + format_number(p.align_mm) + " mm",
+                  "choose a --spacing-mm like 0.1, 0.125, 0.2 or 0.25");
+    const Vec3 centre = ct_.frame.index_from_world({p.centre_mm[0], p.centre_mm[1], p.centre_mm[2]});
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double middle = (centre[a] + 0.5) * ct_.frame.spacing_mm[a] / h_, half = p.box_mm[a] / h_ / 2;
+      const int lo = static_cast<int>(std::floor((middle - half) / step + 1e-6)) * step, hi = static_cast<int>(std::ceil((middle + half) / step - 1e-6)) * step;
+      first_[a] = std::max(lo, 0);
+      const int end = std::min(hi, frame_.dims[a] / step * step);
+      if (end <= first_[a]) throw Error(ExitCode::usage, "the box does not lie in the image", "give --centre-mm in LPS mm, within the CT");
+      frame_.dims[a] = end - first_[a];
+    }
+  }
 
   void find_occupied_blocks() {
     for (std::size_t a = 0; a < 3; ++a) blocks_[a] = (ct_.frame.dims[a] + kBlock - 1) / kBlock;
@@ -242,6 +269,7 @@ class Resampler {
   double h_;
   Frame frame_;
   std::array<AxisMap, 3> axis_;
+  std::array<int, 3> first_{};  // of the output grid, counted from where a grid of all begins
   std::array<int, 3> blocks_{};
   std::vector<std::uint8_t> occupied_;
   std::vector<Ijk> bricks_;
@@ -309,7 +337,12 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   const auto& bricks = resampler.bricks();
   context.progress(0.1, "boundary");
   double unshifted = 0;
-  const auto offset = static_cast<float>(find_offset(resampler, result.volume_before_mm3, context, unshifted));
+  ResampleParams whole = p;
+  whole.spacing_mm = p.align_mm;
+  whole.box_mm = {0, 0, 0};
+  const bool boxed = Resampler::boxed(p);
+  const std::unique_ptr<const Resampler> all = boxed ? std::make_unique<const Resampler>(ct, mask, whole) : nullptr;
+  const auto offset = static_cast<float>(find_offset(all ? *all : resampler, result.volume_before_mm3, context, unshifted));
   context.progress(0.5, "voxels");
 
   std::vector<std::unique_ptr<float[]>> densities(bricks.size()), values(bricks.size());
@@ -358,10 +391,10 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   result.density = grid::wrap(density, resampler.frame(), "density");
   result.hu = grid::wrap(hu, resampler.frame(), "hu");
 
-  const double change = 100 * (result.volume_after_mm3 / result.volume_before_mm3 - 1);
+  const double change = boxed ? 0 : 100 * (result.volume_after_mm3 / result.volume_before_mm3 - 1);
   context.report("volume_before_mm3", result.volume_before_mm3);
   context.report("volume_after_mm3", result.volume_after_mm3);
-  context.report("volume_change_percent", change);
+  if (!boxed) context.report("volume_change_percent", change);
   context.report("volume_change_unshifted_percent", 100 * (unshifted / result.volume_before_mm3 - 1));
   context.report("boundary_offset_hu", static_cast<double>(offset));
   context.report("bone_voxels", static_cast<std::int64_t>(result.density.active_voxels));
@@ -376,7 +409,7 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
 
 StageInfo ResampleStage::info() {
   return {.name = "resample",
-          .version = 3,
+          .version = 4,
           .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
           .description =
               "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "

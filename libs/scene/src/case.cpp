@@ -32,7 +32,9 @@ void write_manifest(const fs::path& folder, const std::string& pipeline_name, co
     for (const auto& [port, path] : r.outputs) {
       if (path.parent_path().lexically_normal() != folder.lexically_normal() && fs::absolute(path).parent_path() != fs::absolute(folder))
         continue;
-      m["files"][port] = {{"file", path.filename().string()}, {"hash", r.output_hashes.at(port)}};
+      // A finer part of the bone is bone too: its stage's name tells them apart.
+      const std::string role = r.id == "region" && port == "bone" ? "region" : port;
+      m["files"][role] = {{"file", path.filename().string()}, {"hash", r.output_hashes.at(port)}};
     }
   }
   if (!m["files"].contains("bone")) {

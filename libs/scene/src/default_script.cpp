@@ -7,8 +7,9 @@
 
 namespace osteo {
 
-Script make_default_script(const BrickGrid& bone, bool left, int tool, double seconds) {
+Script make_default_script(const World& world, bool left, int tool, double seconds) {
   // Centre of the bone, from a brick's middle each: near enough for a starting point.
+  const BrickGrid& bone = world.bodies().front().body->bone;
   Vec3 sum{};
   double weight = 0;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
@@ -31,7 +32,7 @@ Script make_default_script(const BrickGrid& bone, bool left, int tool, double se
       const Vec3 from = centre + Vec3{0, 2.0 * ring * std::cos(angle), 2.0 * ring * std::sin(angle)};
       double bone_end = -1;
       for (double s = 0; s < longest; s += 0.25) {
-        if (bone.nearest(from + out * s) >= 0.5F) {
+        if (world.nearest(from + out * s) >= 0.5F) {
           bone_end = s;
         } else if (bone_end >= 0 && s - bone_end > 20) {
           break;

@@ -215,6 +215,61 @@ TEST(Operation, ForceGoesWithThePiece) {
   }
 }
 
+// A burr that slides from coarse into fine bone and out again, over a flat face: nothing to feel where they meet.
+TEST(Operation, TheBorderOfARegionIsNotFelt) {
+  const auto fill = [](BrickGrid& g) {
+    for (VoxelKey v = 0; v < g.brick_count() * BrickGrid::kVoxels; ++v) {
+      const Ijk c = g.coordinate(v);
+      const double z = g.frame().world_from_index({double(c.i), double(c.j), double(c.k)}).z;
+      g.set(v, static_cast<float>(std::clamp(0.5 - z / g.frame().spacing_mm.x, 0.0, 1.0)));
+    }
+  };
+  Frame f;
+  f.dims = {96, 48, 32};
+  f.spacing_mm = {0.5, 0.5, 0.5};
+  f.origin_mm = {-23.75, -11.75, -9.6};  // the face cuts voxels
+  std::vector<Ijk> bricks;
+  for (int b = 0; b < 12 * 6 * 4; ++b) bricks.push_back({b % 12, b / 12 % 6, b / 72});
+  BrickGrid coarse(f, bricks);
+  fill(coarse);
+  Frame g = f;
+  g.spacing_mm = {0.2, 0.2, 0.2};
+  g.dims = {80, 80, 60};  // 16 x 16 x 12 mm
+  g.origin_mm = f.world_from_index({15.5, 7.5, 7.5}) + Vec3{0.1, 0.1, 0.1};
+  bricks.clear();
+  for (int b = 0; b < 10 * 10 * 8; ++b) bricks.push_back({b % 10, b / 10 % 10, b / 100});
+  BrickGrid fine(g, bricks);
+  fill(fine);
+  for (VoxelKey v = 0; v < fine.brick_count() * BrickGrid::kVoxels; ++v) {
+    if (fine.coordinate(v).k >= 60) fine.set(v, 0);
+  }
+  World world(std::move(coarse));
+  world.add_region(std::move(fine));
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  setup.params.effects.shaft = false;
+  HapticRenderer renderer(setup, {}, 1e-3);
+  HapticScene scene = HapticScene::of(world, renderer.setup());
+  renderer.show(&scene);
+  double least = 1e9, most = 0, sideways = 0;
+  for (int t = 0; t < 4000; ++t) {
+    DeviceSample s;
+    s.tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, 6));
+    // x from -20 to 4: over the border at -16, and along it at an angle.
+    s.position_mm = to_floats({-20 + 0.006 * t, -4 + 0.001 * t, 3 - 0.6});
+    s.axis = {0, 0, 1};
+    renderer.step(s);
+    const ContactResult& c = renderer.contact();
+    if (t < 50) continue;
+    least = std::min(least, c.force_n.z);
+    most = std::max(most, c.force_n.z);
+    sideways = std::max(sideways, std::hypot(c.force_n.x, c.force_n.y));
+  }
+  EXPECT_GT(least, 1.5);
+  EXPECT_LT(most - least, 0.03 * most) << least << " to " << most;
+  EXPECT_LT(sideways, 0.03 * most);
+}
+
 TEST(Operation, APlateRestsOnBone) {
   for (const char* name : {"miniplate-4", "reconstruction-8", "distractor"}) {
     World world(test::bar(0.5, 0.2));

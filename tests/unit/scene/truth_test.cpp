@@ -87,7 +87,7 @@ TEST(Truth, SurfaceWithinHalfAVoxelOfTheExactBoundary) {
 TEST(Truth, DefaultStrokesDrillTheChosenSide) {
   const BrickGrid bone = to_bricks(head().bone.density);
   for (const bool left : {true, false}) {
-    const Script s = make_default_script(bone, left, 3, 5);
+    const Script s = make_default_script(World(BrickGrid(bone)), left, 3, 5);
     for (const auto& w : s.waypoints) EXPECT_GT(w.at_mm.x * (left ? 1 : -1), 30);
     Rehearsal rehearsal(World(BrickGrid(bone)), std::make_unique<ScriptedDevice>(s, 1000), {}, {});
     EXPECT_GT(rehearsal.run_to_end({}).removed_mm3, 5);

@@ -140,6 +140,8 @@ class World {
 
   /// Of bodies, poses and fixtures; the bone's own hash where there is one body, unmoved, and nothing on it.
   [[nodiscard]] std::string hash() const;
+  /// Density at a point of the world, of whichever body has the most there.
+  [[nodiscard]] float nearest(Vec3 world_mm) const;
   /// Density over all bodies, mm3.
   [[nodiscard]] double volume_mm3() const;
 

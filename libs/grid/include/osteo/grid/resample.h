@@ -1,5 +1,7 @@
 // CT and bone mask to isotropic sparse bone density.
 #pragma once
+#include <array>
+
 #include "osteo/data/sparse_grid.h"
 #include "osteo/data/volume.h"
 #include "osteo/stage/stage.h"
@@ -9,6 +11,9 @@ namespace osteo {
 struct ResampleParams {
   double spacing_mm = 0.5;
   double lower = 0;  ///< 0: the value that tells the mask from the rest best
+  std::array<double, 3> box_mm{0, 0, 0};     ///< only this much, around centre_mm; 0: all there is
+  std::array<double, 3> centre_mm{0, 0, 0};  ///< LPS
+  double align_mm = 0.5;                     ///< the box grows to faces of voxels of this edge: those of the bone it is a finer part of
 };
 
 struct ResampledBone {
@@ -24,6 +29,7 @@ struct ResampledBone {
 /// The boundary's offset is then set (a few HU at most, reported) so that the bone keeps the mask's volume; see docs.
 /// A voxel's density is the share of it inside, from the signed HU distance to the boundary over its gradient; coarser
 /// voxels than the CT's are averaged from sub-voxels, so nothing aliases.
+/// With a box, the boundary's offset is that of the whole bone at align_mm, so that both meet where they touch.
 /// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels (the highest such).
 /// `ct` and `mask` must lie at the same place (Error usage). O(output voxels near bone). Same bytes for any thread count.
 [[nodiscard]] ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& params, const Context& context = {});
@@ -33,6 +39,9 @@ struct ResampleStage {
   static void describe(Params& p, auto& visit) {
     visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
     visit({"lower", "HU at the boundary of bone (0: the value that fits the mask best, the --lower of threshold)", "HU", -32768, 32767}, p.lower);
+    visit({"box_mm", "only a box of this size: a region of interest in a coarser bone (0,0,0: all)", "mm", 0, 1000}, p.box_mm);
+    visit({"centre_mm", "middle of the box, LPS", "mm"}, p.centre_mm);
+    visit({"align_mm", "edge of the voxels of that coarser bone; the box grows to their faces", "mm", 0.05, 10}, p.align_mm);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -123,6 +123,6 @@ void apply_recorded(const Session& session, World& world);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
 /// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
-[[nodiscard]] Script make_default_script(const BrickGrid& bone, bool left, int tool, double seconds);
+[[nodiscard]] Script make_default_script(const World& world, bool left, int tool, double seconds);
 
 }  // namespace osteo

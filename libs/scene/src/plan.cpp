@@ -1,0 +1,131 @@
+#include "osteo/scene/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/base/param.h"
+#include "osteo/bone/plate_fit.h"
+#include "osteo/bone/world_mesh.h"
+#include "osteo/io/surface_io.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json matrix(const RigidTransform& t) {
+  ordered_json rows = ordered_json::array();
+  for (std::size_t r = 0; r < 3; ++r)
+    rows.push_back({t.rotation.column[0][r], t.rotation.column[1][r], t.rotation.column[2][r], t.shift_mm[r]});
+  rows.push_back({0, 0, 0, 1});
+  return rows;
+}
+ordered_json triple(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+
+ordered_json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
+  const PlateModel& plate = plate_library()[f.plate];
+  const RigidTransform pose = pose_of(world, f);
+  std::vector<double> gaps;
+  std::string text = "x_mm,y_mm,z_mm,gap_mm,piece\n";
+  std::size_t none = 0;
+  constexpr double kReachMm = 5;
+  for (const PlateGap& g : plate_gaps(world, plate, pose, f.opening_mm, 400, kReachMm)) {
+    const Vec3 p = pose(g.at_mm);
+    const bool met = g.body != SceneAction::kNobody;
+    text += format_number(p.x) + "," + format_number(p.y) + "," + format_number(p.z) + "," + (met ? format_number(g.gap_mm) : "") + "," +
+            (met ? std::to_string(g.body) : "") + "\n";
+    if (met) gaps.push_back(g.gap_mm);
+    none += met ? 0 : 1;
+  }
+  write_file(csv, text);
+  ordered_json j;
+  j["points"] = gaps.size() + none;
+  j["points_without_bone_within_5_mm"] = none;
+  if (gaps.empty()) return j;
+  std::sort(gaps.begin(), gaps.end());
+  double sum = 0, close = 0;
+  for (const double g : gaps) {
+    sum += g;
+    close += std::abs(g) <= 0.5 ? 1 : 0;
+  }
+  j["mean_mm"] = sum / static_cast<double>(gaps.size());
+  j["least_mm"] = gaps.front();
+  j["median_mm"] = gaps[gaps.size() / 2];
+  j["most_mm"] = gaps.back();
+  j["share_within_half_a_mm"] = close / static_cast<double>(gaps.size() + none);
+  return j;
+}
+
+}  // namespace
+
+std::string write_plan(const World& world, const fs::path& folder, const Context& context) {
+  if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already", "give the name of a new folder");
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message());
+  ordered_json j;
+  j["osteotome_plan"] = 1;
+  j["units"] = "mm, LPS; transforms take points of the case to where they are now";
+  j["pieces"] = ordered_json::array();
+  const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
+  double done = 0;
+  for (const PlacedBody& b : world.bodies()) {
+    context.progress(done++ / steps, "pieces");
+    const std::string name = "piece-" + std::to_string(b.body->id) + ".stl";
+    save_surface(surface_of(b, context), folder / name);
+    const LiveComponents solid(b.body->bone);
+    const double voxel = b.body->bone.frame().voxel_volume_mm3();
+    const auto& parts = solid.components();
+    const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& x, const auto& y) { return x.mass < y.mass; });
+    ordered_json piece{{"number", b.body->id},
+                       {"file", name},
+                       {"volume_mm3", b.body->bone.sum() * voxel},
+                       {"region_of_interest", b.of_region},
+                       {"transform", matrix(b.world_from_body)},
+                       {"shift_mm", triple(b.world_from_body.shift_mm)}};
+    if (largest != parts.end()) {
+      piece["centre_mm"] = triple(b.world_from_body(largest->centre_mm));
+      piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"] = ordered_json::array();
+      for (const double i : largest->inertia_mm2) piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"].push_back(i * voxel / 1000);
+    }
+    j["pieces"].push_back(piece);
+  }
+  j["plates"] = ordered_json::array();
+  for (const Fixture& f : world.fixtures()) {
+    context.progress(done++ / steps, "plates");
+    const PlateModel& plate = plate_library()[f.plate];
+    const std::string name = "plate-" + std::to_string(f.id);
+    save_surface(plate_of(world, f), folder / (name + ".stl"));
+    const RigidTransform pose = pose_of(world, f);
+    ordered_json screws = ordered_json::array();
+    for (const Vec3 h : plate.holes_mm) {
+      const bool moves = plate.most_opening_mm > 0 && h.x > 0;
+      screws.push_back(triple(pose(h + Vec3{moves ? f.opening_mm : 0, 0, 0})));
+    }
+    ordered_json on = ordered_json::array({f.body});
+    if (f.other != SceneAction::kNobody) on.push_back(f.other);
+    j["plates"].push_back({{"number", f.id},
+                           {"plate", plate.name},
+                           {"about", plate.about},
+                           {"file", name + ".stl"},
+                           {"pieces", on},
+                           {"transform", matrix(pose)},
+                           {"opening_mm", f.opening_mm},
+                           {"screw_diameter_mm", plate.screw_mm},
+                           {"screws_at_mm", screws},
+                           {"screws_towards", triple(pose.rotation.column[2] * -1)},
+                           {"gap", gaps_of(world, f, folder / (name + "-gap.csv"))}});
+  }
+  context.progress(1);
+  const std::string text = j.dump(2) + "\n";
+  write_file(folder / "plan.json", text);
+  return text;
+}
+
+}  // namespace osteo
