@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin saw pieces curve snapshot structures phantom list info series guide convert run prepare scene rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin saw pieces curve snapshot structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -32,7 +32,7 @@ _osteo() {
     import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
-    resample) flags="$flags --xml --describe --spacing-mm --lower --hu-out" ;;
+    resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
     mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
@@ -46,7 +46,7 @@ _osteo() {
     pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
-    structures) flags="$flags --xml --describe --names --image" ;;
+    structures) flags="$flags --xml --describe --names --only-named --image" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --seed --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
@@ -55,7 +55,8 @@ _osteo() {
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
-    scene) flags="$flags --settings --contact" ;;
+    scene) flags="$flags --settings --contact --dust" ;;
+    plan) flags="$flags --out --case-folder" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --pieces --dust --resume" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;

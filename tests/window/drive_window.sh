@@ -46,6 +46,13 @@ xdotool keydown v; sleep 0.4; xdotool keyup v
 # Turn the view with the right button, then a screenshot.
 xdotool mousedown 3; sleep 0.3; xdotool mousemove_relative -- 30 12; sleep 0.4; xdotool mouseup 3; sleep 0.4
 xdotool key s; sleep 1.5
+# Saw, take apart, carry a piece, put a plate somewhere, take the last steps back.
+xdotool mousemove 480 330; sleep 0.3
+xdotool key x; sleep 0.5; xdotool key Return; sleep 1
+xdotool key p; sleep 0.5; xdotool key Return; sleep 1.5
+xdotool mousedown 1; sleep 0.3; xdotool mousemove_relative -- 40 -20; sleep 0.5; xdotool mouseup 1; sleep 0.4
+xdotool key l; sleep 0.7; xdotool key f; sleep 0.7; xdotool click 4; xdotool click 4; sleep 0.7; xdotool key Return; sleep 0.7
+xdotool key z; sleep 0.5; xdotool key Escape; sleep 0.3
 xdotool key F5; sleep 2
 xdotool key s; sleep 1.5
 xdotool key q
@@ -60,6 +67,7 @@ import json
 s = json.load(open("session/summary.json"))
 assert s["removed_mm3"] > 1, s
 assert s["ticks_lost_by_readers"] == 0, s
+assert s["sawn_mm3"] > 10, s
 PY
 "$bin/osteo" replay session
 second=case/sessions/1

@@ -141,7 +141,7 @@ struct PrepareCommand {
     visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);
     visit({"remove_table", "clear table and head holder"}, p.remove_table);
     visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"}, p.structures);
-    visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'"}, p.names);
+    visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'; values without a name are left out"}, p.names);
     visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);

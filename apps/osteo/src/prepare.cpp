@@ -61,6 +61,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
     if (has_ct) node.inputs["image"].node = "ct";
     node.params["names"] = p.names;
+    if (!p.names.empty()) node.params["only_named"] = "true";
     node.outputs["structures"] = folder / "structures.seg.nrrd";
     pipeline.nodes.push_back(std::move(node));
     for (PipelineNode& n : pipeline.nodes) {

@@ -84,8 +84,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
                                  : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy);
-  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds)
-                                         : load_script(p.script);
+  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds) : load_script(p.script);
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
 
@@ -215,12 +214,13 @@ int ExportCommand::run(const Params&, cli::Invocation& io) {
 }
 
 cli::CommandInfo PlanCommand::info() {
-  return {"plan",
-          "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
-          "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below its underside; a picture "
-          "too.",
-          {{"session", "a session folder"}},
-          "osteo plan SESSION -o plan"};
+  return {
+      "plan",
+      "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
+      "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below its underside; a picture "
+      "too.",
+      {{"session", "a session folder"}},
+      "osteo plan SESSION -o plan"};
 }
 
 int PlanCommand::run(const Params& p, cli::Invocation& io) {
@@ -237,7 +237,7 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
       hi[a] = std::max(hi[a], static_cast<double>(q[a]));
     }
   }
-  const WorldPicture view{(lo + hi) * 0.5, 0.5 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
+  const WorldPicture view{(lo + hi) * 0.5, 0.36 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
   save_picture(draw_world(world, follower, nullptr, view), folder / "plan.png");
   io.end_progress();
   if (io.common.json) io.out << text;

@@ -50,8 +50,8 @@ std::array<std::uint8_t, 3> colour_for(const std::string& name, std::size_t n) {
 
 }  // namespace
 
-Labels name_structures(const Labels& labels, const std::string& names, const Image* ct, const Context& context) {
-  const auto given = parse_names(names);
+Labels name_structures(const Labels& labels, const StructuresParams& params, const Image* ct, const Context& context) {
+  const auto given = parse_names(params.names);
   std::array<std::uint64_t, 256> count{}, inside{};
   const Frame& f = labels.frame;
   std::size_t at = 0;
@@ -86,28 +86,46 @@ Labels name_structures(const Labels& labels, const std::string& names, const Ima
   }
   Labels result = labels;
   result.structures.clear();
+  bool left_out = false;
   for (std::size_t v = 1; v < 256; ++v) {
     if (count[v] == 0) continue;
     Structure s{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {}};
+    bool named = false;
     for (const Structure& own : labels.structures) {
       if (own.value == v) s = own;
+      named |= own.value == v;
     }
-    if (const auto it = given.find(static_cast<int>(v)); it != given.end()) s.name = it->second;
+    if (const auto it = given.find(static_cast<int>(v)); it != given.end()) {
+      s.name = it->second;
+      named = true;
+    }
+    if (params.only_named && !named) {
+      count[v] = 0;
+      left_out = true;
+      continue;
+    }
     if (s.rgb == std::array<std::uint8_t, 3>{}) s.rgb = colour_for(s.name, result.structures.size());
     context.report(s.name + " mm3", static_cast<double>(count[v]) * f.voxel_volume_mm3());
     result.structures.push_back(std::move(s));
+  }
+  if (result.structures.empty())
+    throw Error(ExitCode::failed, "no value of the label map has a name", "give --names, or leave --only-named out");
+  if (left_out) {
+    auto kept = make_voxels<std::uint8_t>(f.voxel_count());
+    for (std::size_t v = 0; v < f.voxel_count(); ++v) kept[v] = count[labels.voxels[v]] > 0 ? labels.voxels[v] : 0;
+    result.voxels = std::move(kept);
   }
   return result;
 }
 
 StageInfo StructuresStage::info() {
   return {.name = "structures",
-          .version = 1,
+          .version = 2,
           .synopsis = "a label map of another program as named structures of a case",
           .description =
               "Takes NRRD (with the names of 3D Slicer), NIfTI, MetaImage, VTI or DICOM SEG, names and colours each value, and checks that "
               "it lies "
-              "where the CT lies. The voxels stay as they are.",
+              "where the CT lies.",
           .inputs = {{"labels", {DataKind::labels}, "label map: nerves, vessels, ossicles"},
                      {"image", {DataKind::image}, "CT that it belongs to, for a check", true}},
           .outputs = {{"structures", {DataKind::labels}, "label map with names and colours"}},
@@ -117,7 +135,7 @@ StageInfo StructuresStage::info() {
 
 std::vector<Data> StructuresStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
   const auto* const ct = std::get_if<Image>(&inputs[1]);
-  return {name_structures(std::get<Labels>(inputs[0]), params.names, ct, context)};
+  return {name_structures(std::get<Labels>(inputs[0]), params, ct, context)};
 }
 
 }  // namespace osteo

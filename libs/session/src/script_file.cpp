@@ -24,6 +24,22 @@ Vec3 vector_or(const ordered_json& j, const char* key, Vec3 otherwise) {
   return j.contains(key) ? point_of(j.at(key)) : otherwise;
 }
 
+// Circles that open and close between the middle and the rim of a bowl, a little deeper each time.
+void cavity(double begin_s, const ordered_json& j, std::vector<Script::Waypoint>& out) {
+  const Vec3 centre = point_of(j.at("centre_mm")), in = normalized(point_of(j.at("towards")));
+  const double rim = j.at("radius_mm"), deep = j.at("depth_mm"), seconds = j.at("over_s"), turns = j.value("turns_per_s", 1.2);
+  const Vec3 u = any_perpendicular(in), v = cross(in, u);
+  constexpr double kStep = 0.05, kSwaysPerS = 0.25;
+  for (double t = 0; t < seconds; t += kStep) {
+    const double share = t / seconds, sway = std::abs(std::fmod(kSwaysPerS * t, 2.0) - 1);
+    const double circle = rim * (1 - sway), angle = 2 * std::numbers::pi * turns * t;
+    // A bowl: less deep towards its rim.
+    const double depth = deep * share * (1 - 0.4 * (circle / rim) * (circle / rim));
+    if (out.empty() || begin_s + t > out.back().t_s)
+      out.push_back({begin_s + t, centre + in * depth + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+  }
+}
+
 // A plate's frame from where its x and z axes point; z counts, x is taken at right angles to it.
 Mat3 axes_of(const ordered_json& j) {
   const Vec3 z = normalized(vector_or(j, "z", {0, 0, 1}));
@@ -151,6 +167,10 @@ Script load_script(const fs::path& path) {
     if (length(script.axis) == 0) throw Error(ExitCode::usage, name + ": the axis has no length");
     for (const auto& w : j.at("waypoints")) {
       where = "waypoint " + std::to_string(script.waypoints.size() + 1);
+      if (w.contains("cavity")) {
+        cavity(w.at("t_s"), w.at("cavity"), script.waypoints);
+        continue;
+      }
       const Script::Waypoint point{w.at("t_s"), point_of(w.at("at_mm")), w.value("drill", true)};
       if (!script.waypoints.empty() && !(point.t_s > script.waypoints.back().t_s))
         throw Error(ExitCode::usage, name + ": " + where + ": times must rise");

@@ -137,11 +137,51 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   chunk.data->GetPointData()->SetNormals(normals);
   if (structures_ != nullptr) chunk.data->GetPointData()->SetScalars(colours);
   chunk.data->Modified();
+  chunk.complete = {xyz.Get(), connectivity.Get(), chunk.complete.version + 1};
+  chunk.partly = false;
   chunk.actor->GetMapper()->Update();
   chunk.actor->SetVisibility(triangles > 0 ? 1 : 0);
 }
 
+namespace {
+
+void set_triangles(vtkPolyData* data, vtkTypeInt32Array* connectivity) {
+  const vtkIdType triangles = connectivity->GetNumberOfValues() / 3;
+  vtkNew<vtkTypeInt32Array> offsets;
+  offsets->SetNumberOfValues(triangles + 1);
+  for (vtkIdType t = 0; t <= triangles; ++t) offsets->SetValue(t, static_cast<int>(3 * t));
+  vtkNew<vtkCellArray> cells;
+  cells->SetData(offsets, connectivity);
+  data->SetPolys(cells);
+  data->Modified();
+}
+
+}  // namespace
+
+void BoneView::draw_only(std::size_t n, std::uint64_t version, std::span<const std::uint32_t> triangles) {
+  Chunk& chunk = chunks_[n];
+  if (chunk.complete.version != version) return;
+  vtkNew<vtkTypeInt32Array> some;
+  some->SetNumberOfValues(static_cast<vtkIdType>(triangles.size()));
+  for (std::size_t i = 0; i < triangles.size(); ++i) some->SetValue(static_cast<vtkIdType>(i), static_cast<int>(triangles[i]));
+  set_triangles(chunk.data, some);
+  chunk.actor->GetMapper()->Update();
+  chunk.actor->SetVisibility(triangles.empty() ? 0 : 1);
+  chunk.partly = true;
+}
+
+void BoneView::draw_all() {
+  for (Chunk& chunk : chunks_) {
+    if (!chunk.partly) continue;
+    set_triangles(chunk.data, chunk.complete.triangles);
+    chunk.actor->GetMapper()->Update();
+    chunk.actor->SetVisibility(chunk.complete.triangles->GetNumberOfValues() > 0 ? 1 : 0);
+    chunk.partly = false;
+  }
+}
+
 void BoneView::place(const RigidTransform& t) {
+  placed_ = t;
   if (!matrix_) {
     if (t.rotation == Mat3{} && t.shift_mm == Vec3{}) return;
     matrix_ = vtkSmartPointer<vtkMatrix4x4>::New();
@@ -156,7 +196,7 @@ void BoneView::highlight(bool on) {
 
 std::size_t BoneView::triangles() const {
   std::size_t total = 0;
-  for (const Chunk& c : chunks_) total += static_cast<std::size_t>(c.data->GetNumberOfCells());
+  for (const Chunk& c : chunks_) total += static_cast<std::size_t>(c.complete.triangles->GetNumberOfValues() / 3);
   return total;
 }
 

@@ -1,6 +1,9 @@
 #include "osteo/view/world_view.h"
 
+#include <meshoptimizer.h>
 #include <vtkActor.h>
+#include <vtkCamera.h>
+#include <vtkFloatArray.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkMapper.h>
 #include <vtkMatrix4x4.h>
@@ -8,6 +11,7 @@
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkRenderer.h>
+#include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <cmath>
@@ -17,6 +21,7 @@
 #include "osteo/io/vtk_data.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/visible.h"
 
 namespace osteo {
 
@@ -37,6 +42,7 @@ WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : re
 }
 
 WorldView::~WorldView() {
+  if (looking_.valid()) looking_.wait();
   if (structures_actor_) renderer_->RemoveActor(structures_actor_);
   for (auto& [id, p] : plates_) {
     renderer_->RemoveActor(p.actor);
@@ -99,6 +105,84 @@ std::size_t WorldView::triangles() const {
   std::size_t total = 0;
   for (const auto& [id, view] : bodies_) total += view->triangles();
   return total;
+}
+
+void WorldView::wake() {
+  looked_ = false;
+  drawn_ = 0;
+  for (auto& [id, view] : bodies_) view->draw_all();
+}
+
+void WorldView::rest(int width, int height) {
+  // All that decides what is seen; not the clipping planes, which follow the drill.
+  vtkCamera* const camera = renderer_->GetActiveCamera();
+  std::vector<double> now{static_cast<double>(width), static_cast<double>(height), camera->GetViewAngle()};
+  for (const double* const v : {camera->GetPosition(), camera->GetFocalPoint(), camera->GetViewUp()}) now.insert(now.end(), v, v + 3);
+  for (const auto& [id, view] : bodies_) {
+    const RigidTransform t = view->placed();
+    for (const Vec3 v : {t.rotation.column[0], t.rotation.column[1], t.shift_mm}) now.insert(now.end(), {v.x, v.y, v.z});
+  }
+  const auto time = std::chrono::steady_clock::now();
+  if (now != camera_) {
+    wake();
+    camera_ = std::move(now);
+    since_ = time;
+    return;
+  }
+  if (looking_.valid() && looking_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    const std::vector<Seen> seen = looking_.get();
+    // For a camera that has moved since it tells nothing.
+    if (looked_) {
+      for (const Seen& s : seen) {
+        if (const auto body = bodies_.find(s.body); body != bodies_.end() && s.chunk < body->second->chunks())
+          body->second->draw_only(s.chunk, s.arrays.version, s.triangles);
+        drawn_ += s.triangles.size() / 3;
+      }
+    }
+    return;
+  }
+  constexpr auto kRest = std::chrono::milliseconds(300);
+  if (looked_ || looking_.valid() || time - since_ < kRest) return;
+  looked_ = true;
+  const double* const m = camera->GetCompositeProjectionTransformMatrix(renderer_->GetTiledAspectRatio(), -1, 1)->GetData();
+  std::vector<Seen> jobs;
+  std::vector<std::array<double, 16>> matrices;
+  for (const auto& [id, view] : bodies_) {
+    const RigidTransform t = view->placed();
+    std::array<double, 16> clip{};
+    for (std::size_t r = 0; r < 4; ++r) {
+      for (std::size_t c = 0; c < 4; ++c) {
+        for (std::size_t k = 0; k < 3; ++k) clip[4 * r + c] += m[4 * r + k] * (c < 3 ? t.rotation.column[c][k] : t.shift_mm[k]);
+        if (c == 3) clip[4 * r + c] += m[4 * r + 3];
+      }
+    }
+    for (std::size_t n = 0; n < view->chunks(); ++n) {
+      jobs.push_back({id, n, view->arrays(n), {}});
+      matrices.push_back(clip);
+    }
+  }
+  looking_ = std::async(std::launch::async, [jobs = std::move(jobs), matrices = std::move(matrices), width, height]() mutable {
+    std::vector<VisibleMesh> meshes;
+    for (std::size_t n = 0; n < jobs.size(); ++n) {
+      auto& a = jobs[n].arrays;
+      meshes.push_back({{a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+                        {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())},
+                        matrices[n]});
+    }
+    const auto seen = visible_triangles(meshes, width, height);
+    std::vector<std::uint32_t> order;
+    for (std::size_t n = 0; n < jobs.size(); ++n) {
+      for (const std::uint32_t t : seen[n]) {
+        for (std::size_t c = 0; c < 3; ++c) jobs[n].triangles.push_back(static_cast<std::uint32_t>(meshes[n].triangles[3 * t + c]));
+      }
+      if (jobs[n].triangles.empty()) continue;
+      // So that a corner is worked on once for the triangles that share it.
+      order.resize(jobs[n].triangles.size());
+      meshopt_optimizeVertexCache(order.data(), jobs[n].triangles.data(), order.size(), meshes[n].points_mm.size() / 3);
+      jobs[n].triangles = order;
+    }
+    return jobs;
+  });
 }
 
 Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p) {

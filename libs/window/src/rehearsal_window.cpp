@@ -179,7 +179,9 @@ class RehearsalWindow {
     double up[3];
     renderer_->GetActiveCamera()->GetViewUp(up);
     const Vec3 right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
-    const Vec3 axis = normalized(right * 0.62 + above * 0.45 - forward * 0.64);
+    // A drill is held from the right; a plate lies flat against what one looks at.
+    const bool plate = tools_ && tools_->tool() == SceneTools::Tool::plate;
+    const Vec3 axis = plate ? forward * -1 : normalized(right * 0.62 + above * 0.45 - forward * 0.64);
     goal_.axis = to_floats(axis);
     goal_.tool = static_cast<std::uint8_t>(tool_);
     goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
@@ -275,6 +277,7 @@ class RehearsalWindow {
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
     renderer_->SetViewport(left, 0, right, 1);
     renderer_->ResetCameraClippingRange();
+    world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -554,8 +557,9 @@ class RehearsalWindow {
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
     if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
-    ImGui::Text("%.2f M triangles, %.0f pictures/s", static_cast<double>(world_view_->triangles()) / 1e6,
-                static_cast<double>(ImGui::GetIO().Framerate));
+    ImGui::Text("%.2f of %.2f M triangles", static_cast<double>(world_view_->drawn_triangles()) / 1e6,
+                static_cast<double>(world_view_->triangles()) / 1e6);
+    ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
     scan_notes();
     ImGui::TextWrapped("F1: mouse and keys");

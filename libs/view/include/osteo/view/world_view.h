@@ -1,7 +1,10 @@
 // A scene that is operated on, in a VTK renderer: bodies, plates, structures at risk, dust.
 #pragma once
+#include <chrono>
+#include <future>
 #include <map>
 #include <memory>
+#include <vector>
 
 #include "osteo/data/data.h"
 #include "osteo/scene/follower.h"
@@ -23,8 +26,19 @@ class WorldView {
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
   [[nodiscard]] std::size_t triangles() const;
+  /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn until camera or pieces
+  /// move. Bone that changes meanwhile is drawn whole.
+  void rest(int width, int height);
+  [[nodiscard]] std::size_t drawn_triangles() const { return drawn_ > 0 ? drawn_ : triangles(); }
 
  private:
+  struct Seen {
+    std::uint32_t body;
+    std::size_t chunk;
+    BoneView::Arrays arrays;
+    std::vector<std::uint32_t> triangles;
+  };
+  void wake();
   struct Plate {
     vtkSmartPointer<vtkActor> actor, moving;
   };
@@ -34,6 +48,11 @@ class WorldView {
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
   std::map<std::uint32_t, Plate> plates_;
   std::unique_ptr<DustView> dust_;
+  std::vector<double> camera_;  // and poses, when last looked at
+  std::chrono::steady_clock::time_point since_{};
+  std::future<std::vector<Seen>> looking_;
+  bool looked_ = false;
+  std::size_t drawn_ = 0;
 };
 
 struct WorldPicture {
