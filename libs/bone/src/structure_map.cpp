@@ -17,8 +17,7 @@ StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context&
   for (std::size_t v = 0; v < labels.frame.voxel_count(); ++v) used[labels.voxels[v]] = true;
   std::vector<std::uint8_t> wanted;
   for (int v = 1; v < 256; ++v) {
-    const bool named = std::any_of(structures_.begin(), structures_.end(), [&](const Structure& s) { return s.value == v; });
-    if (used[static_cast<std::size_t>(v)] && (named || structures_.empty())) wanted.push_back(static_cast<std::uint8_t>(v));
+    if (used[static_cast<std::size_t>(v)]) wanted.push_back(static_cast<std::uint8_t>(v));
   }
   DistanceMapOptions options;
   options.region = DistanceRegion::band;

@@ -19,7 +19,7 @@ namespace osteo {
 /// Immutable.
 class StructureMap {
  public:
-  /// Of a map that names structures only those count; of one without names all values. Error(failed) when the map holds no structure.
+  /// Error(failed) when the map holds no structure.
   explicit StructureMap(const Labels& labels, double reach_mm = 8, const Context& context = {});
 
   struct Answer {

@@ -1,0 +1,56 @@
+// Where an elastic body comes to rest under a load.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "osteo/base/context.h"
+#include "osteo/tissue/energy.h"
+
+namespace osteo {
+
+/// Dead loads on points, and points that do not move. Forces in N.
+struct TissueLoad {
+  std::vector<std::pair<std::uint32_t, Vec3>> forces_n;
+  std::vector<std::uint32_t> fixed;
+};
+
+struct EquilibriumOptions {
+  double tolerance = 1e-10;  ///< of the residual force, relative to the load (or to what the energy's forces cancel to)
+  int iterations = 100;
+  int load_steps = 1;        ///< the load grows in so many equal steps
+};
+
+struct Equilibrium {
+  std::vector<Vec3> points_mm;
+  bool converged = false;
+  std::string why;  ///< not converged: what happened
+  int iterations = 0, factorisations = 0;
+  double residual = 0;       ///< relative, as for tolerance
+  double energy_mj = 0;      ///< internal
+  std::uint64_t shifted = 0;  ///< factorisations that needed a shift: the energy was not convex there
+};
+
+/// Newton's method with exact Hessians: where Cholesky fails the diagonal is shifted until it does not; steps are shortened until the
+/// energy falls (L. Armijo 1966). Each iteration's cost is a sparse factorisation (Eigen's SimplicialLLT, AMD order). Made once for a
+/// topology and a set of fixed points; solves as often as asked. Deterministic.
+class EquilibriumSolver {
+ public:
+  /// Errors: usage, when a part of the body has fewer than three fixed points that are not in a line (it could move freely), or an index
+  /// is out of range; `rest` decides that.
+  EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed);
+  ~EquilibriumSolver();
+
+  /// From `start`, which must have finite energy. `energy` may be another of the same topology than it was made for.
+  Equilibrium solve(const Energy& energy, std::span<const Vec3> start, std::span<const std::pair<std::uint32_t, Vec3>> forces_n,
+                    const EquilibriumOptions& options = {}, const Context& context = {});
+
+  /// Right after solve(): answers `right` (one vector a point) of H x = right at the equilibrium, zero at fixed points. For sensitivities.
+  void back_solve(std::span<const Vec3> right, std::span<Vec3> x) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace osteo

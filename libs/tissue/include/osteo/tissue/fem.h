@@ -1,0 +1,74 @@
+// Finite elements: what a deformable body really does, as far as its mesh allows.
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "osteo/data/tet_mesh.h"
+#include "osteo/tissue/energy.h"
+#include "osteo/tissue/equilibrium.h"
+
+namespace osteo {
+
+struct Material {
+  double young_mpa = 0.1;
+  double poisson = 0.45;
+  [[nodiscard]] double shear_mpa() const { return young_mpa / (2 * (1 + poisson)); }
+  [[nodiscard]] double lambda_mpa() const { return young_mpa * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
+};
+
+/// linear: small strain. stvk: Saint Venant-Kirchhoff, Green's strain in Hooke's law (what programs mean by large displacement with elastic
+/// constants). neo_hooke: W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2, infinite where J <= 0.
+enum class ElasticLaw : int { linear, stvk, neo_hooke };
+/// t4: linear tetrahedra; too stiff in bending, and lock as Poisson's ratio nears a half. t10: quadratic, straight edges at rest, 4 Gauss points.
+enum class TetOrder : int { t4, t10 };
+
+/// A body of tetrahedra with one material a tetrahedron. Points are mm at rest; of t10 the corners come first, as in the mesh.
+class FemBody final : public Energy {
+ public:
+  /// Errors: usage for a Poisson's ratio outside (-1, 0.5), a modulus not above 0, an index out of range; corrupt for a tetrahedron of volume
+  /// <= 0. `materials`: one for all, or one a tetrahedron.
+  FemBody(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets, std::vector<Material> materials, ElasticLaw law,
+          TetOrder order);
+
+  [[nodiscard]] std::size_t point_count() const override { return rest_.size(); }
+  [[nodiscard]] std::size_t element_count() const override { return count_; }
+  [[nodiscard]] std::span<const std::uint32_t> nodes(std::size_t e) const override { return {nodes_.data() + e * per_, per_}; }
+  double element(std::size_t e, const Vec3* x, double* gradient, double* hessian) const override;
+
+  [[nodiscard]] const std::vector<Vec3>& rest() const { return rest_; }
+  [[nodiscard]] std::size_t corner_count() const { return corners_; }
+  /// Fixed corners, and of t10 also the points in the middle of edges between two of them.
+  [[nodiscard]] std::vector<std::uint32_t> with_middles(std::span<const std::uint32_t> corners) const;
+  /// Tetrahedra that are turned inside out (of t10: at a Gauss point).
+  [[nodiscard]] std::size_t inverted(std::span<const Vec3> x) const;
+  [[nodiscard]] const std::vector<Material>& materials() const { return materials_; }
+  [[nodiscard]] ElasticLaw law() const { return law_; }
+  [[nodiscard]] TetOrder order() const { return per_ == 4 ? TetOrder::t4 : TetOrder::t10; }
+
+ private:
+  struct Gauss {
+    std::array<Vec3, kMostNodes> gradient;  // of the shape functions, 1/mm
+    double weight_mm3;
+  };
+  [[nodiscard]] const Material& material(std::size_t e) const { return materials_[materials_.size() == 1 ? 0 : e]; }
+
+  std::vector<Vec3> rest_;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<std::array<std::uint32_t, 2>> middle_of_;  // of t10: the corners that a later point lies between
+  std::size_t count_, per_, corners_;
+  std::vector<Gauss> gauss_;
+  std::size_t gauss_per_;
+  std::vector<Material> materials_;
+  ElasticLaw law_;
+};
+
+/// Points in mm and tetrahedra of a mesh, for both models.
+[[nodiscard]] std::vector<Vec3> points_of(const TetMesh& mesh);
+[[nodiscard]] std::vector<std::array<std::uint32_t, 4>> tets_of(const TetMesh& mesh);
+
+/// The same problem as an input file of CalculiX or Abaqus (*ELEMENT C3D4 or C3D10, *ELASTIC, *CLOAD, with NLGEOM unless linear); neo_hooke
+/// has no counterpart there (theirs splits off the volume). Displacements are printed to the .dat file. Error(usage) for neo_hooke.
+[[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
+
+}  // namespace osteo

@@ -1,0 +1,291 @@
+#include "osteo/tissue/equilibrium.h"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "osteo/base/error.h"
+
+namespace osteo {
+namespace {
+
+using Matrix = Eigen::SparseMatrix<double>;
+constexpr std::uint32_t kFixed = 0xffffffffU;
+
+std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+}  // namespace
+
+struct EquilibriumSolver::Impl {
+  std::vector<std::uint32_t> number;  // of a point among those that move
+  std::size_t moving = 0;
+  std::vector<std::uint32_t> first;    // of each element in slots
+  std::vector<std::int64_t> slots;     // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
+  Matrix h;
+  Eigen::SimplicialLLT<Matrix, Eigen::Lower> factor;
+  bool analysed = false;
+
+  void pattern(const Energy& energy);
+  void assemble(const Energy& energy, std::span<const Vec3> x, std::vector<Vec3>& gradient);
+};
+
+void EquilibriumSolver::Impl::pattern(const Energy& energy) {
+  // Lower blocks of each column of blocks.
+  std::vector<std::vector<std::uint32_t>> below(moving);
+  for (std::size_t e = 0; e < energy.element_count(); ++e) {
+    for (const std::uint32_t a : energy.nodes(e)) {
+      for (const std::uint32_t b : energy.nodes(e)) {
+        const std::uint32_t i = number[a], j = number[b];
+        if (i != kFixed && j != kFixed && i >= j) below[j].push_back(i);
+      }
+    }
+  }
+  std::size_t blocks = 0;
+  for (auto& column : below) {
+    std::sort(column.begin(), column.end());
+    column.erase(std::unique(column.begin(), column.end()), column.end());
+    blocks += column.size();
+  }
+  // Whole 3 x 3 blocks on the diagonal too: the upper part is stored and not used.
+  const auto n = static_cast<Eigen::Index>(3 * moving);
+  h.resize(n, n);
+  h.resizeNonZeros(static_cast<Eigen::Index>(9 * blocks));
+  std::vector<std::int64_t> block_at;  // of each lower block, by column: value of its first row in the first column
+  std::int64_t at = 0;
+  for (std::size_t j = 0; j < moving; ++j) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      h.outerIndexPtr()[3 * j + c] = static_cast<int>(at);
+      for (const std::uint32_t i : below[j]) {
+        for (std::size_t r = 0; r < 3; ++r) h.innerIndexPtr()[at++] = static_cast<int>(3 * i + r);
+      }
+    }
+  }
+  h.outerIndexPtr()[n] = static_cast<int>(at);
+  first.assign(energy.element_count() + 1, 0);
+  slots.clear();
+  for (std::size_t e = 0; e < energy.element_count(); ++e) {
+    first[e] = static_cast<std::uint32_t>(slots.size());
+    for (const std::uint32_t a : energy.nodes(e)) {
+      for (const std::uint32_t b : energy.nodes(e)) {
+        const std::uint32_t i = number[a], j = number[b];
+        if (i == kFixed || j == kFixed || i < j) {
+          slots.push_back(-1);
+          continue;
+        }
+        const auto& column = below[j];
+        const auto place = std::lower_bound(column.begin(), column.end(), i) - column.begin();
+        slots.push_back(h.outerIndexPtr()[3 * j] + 3 * place);
+      }
+    }
+  }
+}
+
+void EquilibriumSolver::Impl::assemble(const Energy& energy, std::span<const Vec3> x, std::vector<Vec3>& gradient) {
+  std::fill(h.valuePtr(), h.valuePtr() + h.nonZeros(), 0.0);
+  std::fill(gradient.begin(), gradient.end(), Vec3{});
+  Vec3 local[Energy::kMostNodes];
+  double g[3 * Energy::kMostNodes], k[9 * Energy::kMostNodes * Energy::kMostNodes];
+  for (std::size_t e = 0; e < energy.element_count(); ++e) {
+    const auto nodes = energy.nodes(e);
+    const std::size_t n = nodes.size();
+    for (std::size_t a = 0; a < n; ++a) local[a] = x[nodes[a]];
+    energy.element(e, local, g, k);
+    const std::int64_t* slot = slots.data() + first[e];
+    for (std::size_t a = 0; a < n; ++a) {
+      gradient[nodes[a]] += Vec3{g[3 * a], g[3 * a + 1], g[3 * a + 2]};
+      for (std::size_t b = 0; b < n; ++b, ++slot) {
+        if (*slot < 0) continue;
+        const auto j = static_cast<std::size_t>(number[nodes[b]]);
+        const std::int64_t step = h.outerIndexPtr()[3 * j + 1] - h.outerIndexPtr()[3 * j];
+        for (std::size_t c = 0; c < 3; ++c) {
+          double* const value = h.valuePtr() + *slot + static_cast<std::int64_t>(c) * step;
+          for (std::size_t r = 0; r < 3; ++r) value[r] += k[(3 * a + r) * 3 * n + 3 * b + c];
+        }
+      }
+    }
+  }
+}
+
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed)
+    : impl_(std::make_unique<Impl>()) {
+  const std::size_t points = energy.point_count();
+  if (rest.size() != points) throw Error(ExitCode::usage, "the rest shape has another number of points than the model");
+  std::vector<bool> is_fixed(points), used(points);
+  for (const std::uint32_t p : fixed) {
+    if (p >= points) throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
+    is_fixed[p] = true;
+  }
+  // Parts that hang together: each must be held.
+  std::vector<std::uint32_t> parent(points);
+  std::iota(parent.begin(), parent.end(), 0U);
+  for (std::size_t e = 0; e < energy.element_count(); ++e) {
+    const auto nodes = energy.nodes(e);
+    for (const std::uint32_t p : nodes) {
+      if (p >= points) throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
+      used[p] = true;
+      const std::uint32_t a = root(parent, nodes[0]), b = root(parent, p);
+      if (a != b) parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<std::vector<std::uint32_t>> held(points);
+  for (std::uint32_t p = 0; p < points; ++p) {
+    if (used[p] && is_fixed[p]) held[root(parent, p)].push_back(p);
+  }
+  for (std::uint32_t p = 0; p < points; ++p) {
+    if (!used[p] || root(parent, p) != p) continue;
+    bool enough = false;
+    const auto& h = held[p];
+    for (std::size_t i = 2; i < h.size() && !enough; ++i) {
+      const Vec3 a = rest[h[1]] - rest[h[0]], b = rest[h[i]] - rest[h[0]];
+      enough = length(cross(a, b)) > 1e-9 * (dot(a, a) + dot(b, b));
+    }
+    if (!enough) {
+      throw Error(ExitCode::usage, "the part of the body with point " + std::to_string(p) + " can move freely: it has " +
+                                       std::to_string(h.size()) + " fixed points",
+                  "fix at least three of its points that do not lie in a line, or leave the part out");
+    }
+  }
+  impl_->number.assign(points, kFixed);
+  for (std::uint32_t p = 0; p < points; ++p) {
+    if (used[p] && !is_fixed[p]) impl_->number[p] = static_cast<std::uint32_t>(impl_->moving++);
+  }
+  impl_->pattern(energy);
+}
+
+EquilibriumSolver::~EquilibriumSolver() = default;
+
+Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3> start,
+                                     std::span<const std::pair<std::uint32_t, Vec3>> forces, const EquilibriumOptions& options,
+                                     const Context& context) {
+  Impl& m = *impl_;
+  Equilibrium result;
+  result.points_mm.assign(start.begin(), start.end());
+  std::vector<Vec3>& x = result.points_mm;
+  std::vector<Vec3> load(x.size()), gradient(x.size()), trial(x.size());
+  for (const auto& [p, f] : forces) {
+    if (p >= x.size() || !std::isfinite(dot(f, f)))
+      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
+    load[p] += f;
+  }
+  const auto free = [&](std::uint32_t p) { return m.number[p] != kFixed; };
+  double load_size = 0;
+  for (std::uint32_t p = 0; p < x.size(); ++p) {
+    if (free(p)) load_size += dot(load[p], load[p]);
+  }
+  load_size = std::sqrt(load_size);
+  double share = 0;
+  const auto potential = [&](std::span<const Vec3> at) {
+    double work = 0;
+    for (std::uint32_t p = 0; p < at.size(); ++p) work += dot(load[p], at[p] - start[p]) * share;
+    return total_energy(energy, at) - work;
+  };
+  const auto n = static_cast<Eigen::Index>(3 * m.moving);
+  Eigen::VectorXd right(n), step(n);
+  double shift = 0;
+  for (int s = 1; s <= std::max(1, options.load_steps); ++s) {
+    share = static_cast<double>(s) / std::max(1, options.load_steps);
+    double value = potential(x);
+    if (!std::isfinite(value)) {
+      result.why = "the model has no finite energy where it starts";
+      return result;
+    }
+    bool done = false;
+    double first_residual = 0;
+    for (int it = 0; it < options.iterations && !done; ++it) {
+      context.check_cancelled();
+      m.assemble(energy, x, gradient);
+      double residual = 0;
+      for (std::uint32_t p = 0; p < x.size(); ++p) {
+        if (!free(p)) continue;
+        const Vec3 r = load[p] * share - gradient[p];
+        residual += dot(r, r);
+        for (std::size_t a = 0; a < 3; ++a) right[static_cast<Eigen::Index>(3 * m.number[p] + a)] = r[a];
+      }
+      residual = std::sqrt(residual);
+      if (it == 0) first_residual = residual;
+      const double scale = load_size > 0 ? load_size : first_residual;
+      result.residual = scale > 0 ? residual / scale : 0;
+      const bool small = result.residual <= options.tolerance;
+      // Cholesky, with a shift where the energy is not convex; what sufficed last time is tried first, a tenth of it.
+      double mean = 0;
+      for (Eigen::Index d = 0; d < n; ++d) mean += std::abs(m.h.coeff(d, d)) / static_cast<double>(n);
+      shift = shift > 1e-9 * mean ? 0.1 * shift : 0;
+      if (!m.analysed) {
+        m.factor.analyzePattern(m.h);
+        m.analysed = true;
+      }
+      for (int tries = 0;; ++tries) {
+        m.factor.setShift(shift);
+        m.factor.factorize(m.h);
+        ++result.factorisations;
+        if (m.factor.info() == Eigen::Success) break;
+        ++result.shifted;
+        shift = shift > 0 ? 4 * shift : 1e-4 * mean;
+        if (tries == 40 || !std::isfinite(mean)) {
+          result.why = "the Hessian cannot be factorised: a number in it is not finite";
+          return result;
+        }
+      }
+      if (small) {
+        done = true;
+        break;
+      }
+      ++result.iterations;
+      step = m.factor.solve(right);
+      const double slope = -right.dot(step);  // of the potential along the step
+      double length = 1;
+      bool moved = false;
+      for (int halve = 0; halve < 40; ++halve, length *= 0.5) {
+        for (std::uint32_t p = 0; p < x.size(); ++p) {
+          trial[p] = x[p];
+          if (free(p)) {
+            const auto i = static_cast<Eigen::Index>(3 * m.number[p]);
+            trial[p] += Vec3{step[i], step[i + 1], step[i + 2]} * length;
+          }
+        }
+        const double next = potential(trial);
+        // Where the energies differ by no more than their rounding, the residual decides.
+        const double noise = 1e-13 * (std::abs(value) + std::abs(next));
+        if (std::isfinite(next) && next <= value + 1e-4 * length * slope + noise) {
+          x.swap(trial);
+          value = next;
+          moved = true;
+          break;
+        }
+      }
+      if (!moved) {
+        result.why = "no step lowers the energy any more, at a residual of " + std::to_string(result.residual);
+        break;
+      }
+    }
+    if (!done) {
+      if (result.why.empty()) result.why = "not at rest after " + std::to_string(options.iterations) + " iterations";
+      result.energy_mj = total_energy(energy, x);
+      return result;
+    }
+  }
+  result.converged = true;
+  result.energy_mj = total_energy(energy, x);
+  return result;
+}
+
+void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> x) const {
+  const Impl& m = *impl_;
+  Eigen::VectorXd b(static_cast<Eigen::Index>(3 * m.moving));
+  for (std::uint32_t p = 0; p < right.size(); ++p) {
+    if (m.number[p] == kFixed) continue;
+    for (std::size_t a = 0; a < 3; ++a) b[static_cast<Eigen::Index>(3 * m.number[p] + a)] = right[p][a];
+  }
+  const Eigen::VectorXd answer = m.factor.solve(b);
+  for (std::uint32_t p = 0; p < x.size(); ++p) {
+    x[p] = {};
+    if (m.number[p] == kFixed) continue;
+    for (std::size_t a = 0; a < 3; ++a) x[p][a] = answer[static_cast<Eigen::Index>(3 * m.number[p] + a)];
+  }
+}
+
+}  // namespace osteo
