@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   if (subject == "bone" || subject == "all") osteo::bench_bone(context);
   if (subject == "haptics" || subject == "all") osteo::bench_haptics(context);
   if (subject == "operation" || subject == "all") osteo::bench_operation(context);
+  if (subject == "tissue" || subject == "all") osteo::bench_tissue(context);
   if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
 #ifdef OSTEO_BENCH_GEOMETRY
   if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
@@ -23,9 +24,9 @@ int main(int argc, char** argv) {
     return 2;
   }
 #endif
-  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" && subject != "operation" &&
+  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" && subject != "operation" && subject != "tissue" &&
       subject != "haptics-fuzz") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation\n", subject.c_str());
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, tissue\n", subject.c_str());
     return 2;
   }
   return 0;

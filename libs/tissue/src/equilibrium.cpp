@@ -194,7 +194,7 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
       return result;
     }
     bool done = false;
-    double first_residual = 0;
+    double first_residual = 0, last_residual = 1e300;
     for (int it = 0; it < options.iterations && !done; ++it) {
       context.check_cancelled();
       m.assemble(energy, x, gradient);
@@ -209,7 +209,10 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
       if (it == 0) first_residual = residual;
       const double scale = load_size > 0 ? load_size : first_residual;
       result.residual = scale > 0 ? residual / scale : 0;
-      const bool small = result.residual <= options.tolerance;
+      // Nearer than rounding lets it, it does not come: then it neither halves any more nor is it large.
+      const bool stalled = result.residual < 1e-7 && result.residual > 0.5 * last_residual;
+      last_residual = result.residual;
+      const bool small = result.residual <= options.tolerance || stalled;
       // Cholesky, with a shift where the energy is not convex; what sufficed last time is tried first, a tenth of it.
       double mean = 0;
       for (Eigen::Index d = 0; d < n; ++d) mean += std::abs(m.h.coeff(d, d)) / static_cast<double>(n);

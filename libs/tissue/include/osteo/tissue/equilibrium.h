@@ -16,7 +16,7 @@ struct TissueLoad {
 };
 
 struct EquilibriumOptions {
-  double tolerance = 1e-10;  ///< of the residual force, relative to the load (or to what the energy's forces cancel to)
+  double tolerance = 1e-10;  ///< of the residual force, relative to the load (without load: to the first); rounding may end it sooner, below 1e-7
   int iterations = 100;
   int load_steps = 1;        ///< the load grows in so many equal steps
 };

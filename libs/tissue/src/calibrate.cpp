@@ -1,0 +1,363 @@
+#include "osteo/tissue/calibrate.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "osteo/base/error.h"
+
+namespace osteo {
+namespace {
+
+// Which grid points a constraint lies between, and how much of each.
+struct Share {
+  std::array<std::uint32_t, 8> at{};
+  std::array<double, 8> weight{};
+};
+
+class Fit {
+ public:
+  Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
+      : model_(model), cases_(cases), options_(options), context_(context), solver_(model, model.rest(), cases.front().load.fixed) {
+    const auto sorted = [](std::vector<std::uint32_t> v) {
+      std::sort(v.begin(), v.end());
+      return v;
+    };
+    for (const CalibrationCase& c : cases) {
+      if (sorted(c.load.fixed) != sorted(cases.front().load.fixed)) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
+      if (c.truth_mm.size() != model.point_count())
+        throw Error(ExitCode::usage, "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
+      double sum = 0;
+      for (std::size_t p = 0; p < c.truth_mm.size(); ++p) sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
+      if (!(sum > 0) || !std::isfinite(sum)) throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
+      truth_rms_.push_back(std::sqrt(sum / static_cast<double>(c.truth_mm.size())));
+      shape_.push_back(model.rest());
+    }
+    lay_grid();
+  }
+
+  [[nodiscard]] int parameters() const { return static_cast<int>(used_.size()); }
+  [[nodiscard]] int residuals() const { return static_cast<int>(3 * model_.point_count() * cases_.size()) + parameters(); }
+  [[nodiscard]] double seed(int parameter, int start) const {
+    // Faces begin small: the closed form has none. Other starts lean on edges or on faces.
+    if (of_map(parameter)) return 0;
+    const TissueClass kind = kind_of(parameter);
+    const double face = start == 2 ? 3 : -2;
+    return kind == TissueClass::face ? face : start == 1 && kind != TissueClass::volume ? 0.7 : start == 2 ? -0.7 : 0;
+  }
+  [[nodiscard]] double pull_goal(int parameter) const {
+    return !of_map(parameter) && kind_of(parameter) == TissueClass::face ? -2 : 0;
+  }
+
+  void set(const double* logs) {
+    std::vector<double> factors(model_.constraints().size());
+    for (std::size_t c = 0; c < factors.size(); ++c) {
+      double log = 0;
+      for_parameters(c, [&](std::uint32_t j, double weight) { log += weight * logs[j]; });
+      factors[c] = std::exp(log);
+    }
+    model_.scale_each(factors);
+  }
+
+  // False when a case finds no rest.
+  bool evaluate(const double* logs, double* residuals, double** jacobian_rows) {
+    set(logs);
+    const std::size_t points = model_.point_count(), parameters = used_.size();
+    double* out = residuals;
+    for (std::size_t n = 0; n < cases_.size(); ++n) {
+      const Equilibrium at = solver_.solve(model_, shape_[n], cases_[n].load.forces_n, options_.equilibrium, context_);
+      // Where it is at rest already (the same factors again, for their Jacobian) nothing was solved.
+      if (at.iterations > 0) ++result.solves;
+      if (!at.converged) {
+        // From rest, before giving it up.
+        ++result.failed_solves;
+        ++result.solves;
+        const Equilibrium again = solver_.solve(model_, model_.rest(), cases_[n].load.forces_n, options_.equilibrium, context_);
+        if (!again.converged) return false;
+        shape_[n] = again.points_mm;
+      } else {
+        shape_[n] = at.points_mm;
+      }
+      const double scale = 1 / (truth_rms_[n] * std::sqrt(static_cast<double>(points * cases_.size())));
+      for (std::size_t p = 0; p < points; ++p)
+        for (std::size_t a = 0; a < 3; ++a) *out++ = (shape_[n][p][a] - cases_[n].truth_mm[p][a]) * scale;
+      if (jacobian_rows != nullptr) differentiate(n, scale, *jacobian_rows, 3 * points * n);
+    }
+    for (std::size_t i = 0; i < parameters; ++i) {
+      const double weight = options_.pull / std::sqrt(static_cast<double>(parameters));
+      *out++ = weight * (logs[i] - pull_goal(static_cast<int>(i)));
+      if (jacobian_rows == nullptr) continue;
+      double* const row = *jacobian_rows + (3 * points * cases_.size() + i) * parameters;
+      std::fill(row, row + parameters, 0.0);
+      row[i] = weight;
+    }
+    return true;
+  }
+
+  Calibration result;
+  [[nodiscard]] const std::vector<std::vector<Vec3>>& shapes() const { return shape_; }
+  // By their full numbers; 0 for those that are not there.
+  [[nodiscard]] std::vector<double> all_of(const std::vector<double>& values) const {
+    std::vector<double> all(numbers());
+    for (std::size_t i = 0; i < used_.size(); ++i) all[used_[i]] = values[i];
+    return all;
+  }
+  [[nodiscard]] std::size_t nodes() const { return nodes_; }
+
+ private:
+  // Numbers of parameters: of own grids point times classes plus class; of a shared one the points, then the classes.
+  [[nodiscard]] std::size_t numbers() const { return options_.shared_grid ? nodes_ + kTissueClasses : nodes_ * kTissueClasses; }
+  [[nodiscard]] bool of_map(int parameter) const { return options_.shared_grid && used_[static_cast<std::size_t>(parameter)] < nodes_; }
+  [[nodiscard]] TissueClass kind_of(int parameter) const {
+    const std::size_t number = used_[static_cast<std::size_t>(parameter)];
+    return static_cast<TissueClass>(options_.shared_grid ? number - nodes_ : number % kTissueClasses);
+  }
+  // The parameters that scale a constraint, and how much of each.
+  template <class F>
+  void for_parameters(std::size_t c, F&& f) const {
+    const auto kind = static_cast<std::size_t>(model_.constraints()[c].kind);
+    for (std::size_t n = 0; n < 8; ++n) {
+      if (share_[c].weight[n] == 0) continue;
+      const std::size_t number = options_.shared_grid ? share_[c].at[n] : share_[c].at[n] * kTissueClasses + kind;
+      if (const std::uint32_t j = parameter_of_[number]; j != kNone) f(j, share_[c].weight[n]);
+    }
+    if (!options_.shared_grid) return;
+    if (const std::uint32_t j = parameter_of_[nodes_ + kind]; j != kNone) f(j, 1.0);
+  }
+  void lay_grid() {
+    const auto& x = model_.rest();
+    Vec3 lo{1e300, 1e300, 1e300}, hi = lo * -1;
+    for (const Vec3& p : x)
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], p[a]);
+        hi[a] = std::max(hi[a], p[a]);
+      }
+    nodes_ = 1;
+    for (const int n : options_.grid) {
+      if (n < 1) throw Error(ExitCode::usage, "the grid of stiffness needs at least one point along each axis");
+      nodes_ *= static_cast<std::size_t>(n);
+    }
+    std::vector<bool> near(numbers());
+    for (const auto& c : model_.constraints()) {
+      Vec3 middle{};
+      for (std::size_t n = 0; n < c.nodes; ++n) middle += x[c.node[n]] / static_cast<double>(c.nodes);
+      int cell[3];
+      double t[3];
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int n = options_.grid[a];
+        const double at = n > 1 ? (middle[a] - lo[a]) / (hi[a] - lo[a]) * (n - 1) : 0;
+        cell[a] = std::clamp(static_cast<int>(at), 0, std::max(0, n - 2));
+        t[a] = n > 1 ? at - cell[a] : 0;
+      }
+      Share s;
+      for (std::size_t n = 0; n < 8; ++n) {
+        double w = 1;
+        std::size_t at = 0, stride = 1;
+        for (std::size_t a = 0; a < 3; ++a) {
+          const int up = static_cast<int>(n >> a & 1);
+          w *= up != 0 ? t[a] : 1 - t[a];
+          at += static_cast<std::size_t>(std::min(cell[a] + up, options_.grid[a] - 1)) * stride;
+          stride *= static_cast<std::size_t>(options_.grid[a]);
+        }
+        s.at[n] = static_cast<std::uint32_t>(at);
+        s.weight[n] = w;
+        // A map of one point is the classes' own factors.
+        if (w > 1e-3 && !(options_.shared_grid && nodes_ == 1)) near[options_.shared_grid ? at : at * kTissueClasses + static_cast<std::size_t>(c.kind)] = true;
+      }
+      if (options_.shared_grid) near[nodes_ + static_cast<std::size_t>(c.kind)] = true;
+      share_.push_back(s);
+    }
+    parameter_of_.assign(numbers(), kNone);
+    for (std::uint32_t i = 0; i < near.size(); ++i) {
+      if (!near[i]) continue;
+      parameter_of_[i] = static_cast<std::uint32_t>(used_.size());
+      used_.push_back(i);
+    }
+  }
+
+  // H du/dlog_j = - sum over constraints of (share of j) * gradient of its energy, since dk/dlog = k.
+  void differentiate(std::size_t n, double scale, double* jacobian, std::size_t first_row) {
+    ++result.jacobians;
+    const std::size_t points = model_.point_count(), parameters = used_.size();
+    std::vector<std::vector<Vec3>> right(parameters, std::vector<Vec3>(points));
+    Vec3 local[8];
+    double g[24];
+    for (std::size_t c = 0; c < model_.constraints().size(); ++c) {
+      const auto nodes = model_.nodes(c);
+      for (std::size_t a = 0; a < nodes.size(); ++a) local[a] = shape_[n][nodes[a]];
+      model_.element(c, local, g, nullptr);
+      for_parameters(c, [&](std::uint32_t k, double weight) {
+        for (std::size_t a = 0; a < nodes.size(); ++a) right[k][nodes[a]] -= Vec3{g[3 * a], g[3 * a + 1], g[3 * a + 2]} * weight;
+      });
+    }
+    std::vector<Vec3> du(points);
+    for (std::size_t j = 0; j < parameters; ++j) {
+      solver_.back_solve(right[j], du);
+      for (std::size_t p = 0; p < points; ++p)
+        for (std::size_t a = 0; a < 3; ++a) jacobian[(first_row + 3 * p + a) * parameters + j] = du[p][a] * scale;
+    }
+  }
+
+  TissueModel& model_;
+  std::span<const CalibrationCase> cases_;
+  CalibrateOptions options_;
+  const Context& context_;
+  EquilibriumSolver solver_;
+  std::vector<double> truth_rms_;
+  std::vector<std::vector<Vec3>> shape_;  // where each case came to rest last
+  std::vector<Share> share_;
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+  std::vector<std::uint32_t> used_, parameter_of_;  // parameter -> number, and back
+  std::size_t nodes_ = 1;
+};
+
+class Cost final : public ceres::CostFunction {
+ public:
+  explicit Cost(Fit& fit) : fit_(fit) {
+    set_num_residuals(fit.residuals());
+    mutable_parameter_block_sizes()->push_back(fit.parameters());
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    double* const jacobian = jacobians != nullptr ? jacobians[0] : nullptr;
+    double* rows = jacobian;
+    return fit_.evaluate(parameters[0], residuals, jacobian != nullptr ? &rows : nullptr);
+  }
+
+ private:
+  Fit& fit_;
+};
+
+class Watch final : public ceres::IterationCallback {
+ public:
+  Watch(std::vector<double>& cost, const Context& context) : cost_(cost), context_(context) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
+    if (s.step_is_successful) cost_.push_back(s.cost);
+    context_.progress(std::min(0.95, 0.05 * s.iteration), "calibrating");
+    return ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  std::vector<double>& cost_;
+  const Context& context_;
+};
+
+}  // namespace
+
+CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth) {
+  const double n = static_cast<double>(rest.size());
+  double off = 0, moved = 0;
+  Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = a;
+  const auto vec = [](Vec3 v) { return Eigen::Vector3d(v.x, v.y, v.z); };
+  for (std::size_t p = 0; p < rest.size(); ++p) {
+    off += dot(shape[p] - truth[p], shape[p] - truth[p]);
+    moved += dot(truth[p] - rest[p], truth[p] - rest[p]);
+    a += vec(shape[p]) / n;
+    b += vec(truth[p]) / n;
+  }
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+  for (std::size_t p = 0; p < rest.size(); ++p) cov += (vec(truth[p]) - b) * (vec(shape[p]) - a).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cov, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d d = Eigen::Matrix3d::Identity();
+  d(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::Matrix3d turn = svd.matrixU() * d * svd.matrixV().transpose();
+  double left = 0;
+  for (std::size_t p = 0; p < rest.size(); ++p) left += (turn * (vec(shape[p]) - a) + b - vec(truth[p])).squaredNorm();
+  return {std::sqrt(off / moved), std::sqrt(left / moved), std::sqrt(off / n), std::sqrt(moved / n)};
+}
+
+Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context) {
+  if (cases.empty()) throw Error(ExitCode::usage, "a calibration needs at least one load");
+  const auto begin = std::chrono::steady_clock::now();
+  Fit fit(model, cases, options, context);
+  Calibration& result = fit.result;
+  result.parameters = fit.parameters();
+  const auto n = static_cast<std::size_t>(fit.parameters());
+
+  // Before: the closed form, as the model stands without factors.
+  {
+    EquilibriumSolver solver(model, model.rest(), cases.front().load.fixed);
+    TissueModel plain = model;
+    plain.scale({1, 1, 0, 1});
+    for (const CalibrationCase& c : cases) {
+      const Equilibrium at = solver.solve(plain, plain.rest(), c.load.forces_n, options.equilibrium, context);
+      result.before.push_back(calibration_error(model.rest(), at.points_mm, c.truth_mm));
+    }
+  }
+  std::vector<double> best;
+  double best_cost = 1e300;
+  ceres::Solver::Summary best_summary;
+  for (int start = 0; start < std::max(1, options.starts); ++start) {
+    std::vector<double> logs(n);
+    for (std::size_t i = 0; i < n; ++i) logs[i] = fit.seed(static_cast<int>(i), start);
+    ceres::Problem problem;
+    problem.AddResidualBlock(new Cost(fit), nullptr, logs.data());
+    for (std::size_t i = 0; i < n; ++i) {
+      problem.SetParameterLowerBound(logs.data(), static_cast<int>(i), options.least_log);
+      problem.SetParameterUpperBound(logs.data(), static_cast<int>(i), options.most_log);
+    }
+    std::vector<double> cost;
+    Watch watch(cost, context);
+    ceres::Solver::Options o;
+    o.linear_solver_type = ceres::DENSE_QR;
+    // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows better.
+    o.trust_region_strategy_type = n > 8 ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
+    o.max_num_iterations = options.iterations;
+    o.function_tolerance = options.tolerance;
+    o.parameter_tolerance = 1e-5;
+    o.num_threads = 1;
+    o.logging_type = ceres::SILENT;
+    o.callbacks.push_back(&watch);
+    ceres::Solver::Summary summary;
+    ceres::Solve(o, &problem, &summary);
+    if (summary.IsSolutionUsable() && summary.final_cost < best_cost) {
+      best_cost = summary.final_cost;
+      best = logs;
+      best_summary = summary;
+      result.cost = cost;
+    }
+  }
+  if (best.empty()) {
+    model.scale({1, 1, 0, 1});
+    result.why = "no factors were found with which the model comes to rest under these loads";
+    return result;
+  }
+  result.converged = best_summary.termination_type == ceres::CONVERGENCE;
+  if (!result.converged) result.why = best_summary.message;
+  // Once more at the answer: shapes and Jacobian.
+  std::vector<double> residuals(static_cast<std::size_t>(fit.residuals())), jacobian(residuals.size() * n);
+  double* rows = jacobian.data();
+  fit.evaluate(best.data(), residuals.data(), &rows);
+  for (std::size_t c = 0; c < cases.size(); ++c)
+    result.after.push_back(calibration_error(model.rest(), fit.shapes()[c], cases[c].truth_mm));
+  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(
+      jacobian.data(), static_cast<Eigen::Index>(residuals.size() - n), static_cast<Eigen::Index>(n));
+  const Eigen::MatrixXd information = j.transpose() * j;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(information, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  // Variance of the residuals for 1 % of the truth's RMS in each coordinate.
+  const double variance = 1e-4 / static_cast<double>(model.point_count() * cases.size()) / 3;
+  std::vector<double> own(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum = 0;
+    for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
+      const double v = svd.matrixV()(static_cast<Eigen::Index>(i), k);
+      sum += v * v / std::max(svd.singularValues()[k], 1e-14 * svd.singularValues()[0]);
+    }
+    own[i] = std::sqrt(sum * variance);
+  }
+  result.uncertainty = fit.all_of(own);
+  const std::vector<double> all = fit.all_of(best);
+  result.log_factors = all;
+  if (options.shared_grid) {
+    result.log_stiffness.assign(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(fit.nodes()));
+    result.log_factors.clear();
+    for (std::size_t p = 0; p < fit.nodes(); ++p)
+      for (std::size_t k = 0; k < kTissueClasses; ++k) result.log_factors.push_back(all[p] + all[fit.nodes() + k]);
+  }
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return result;
+}
+
+}  // namespace osteo
