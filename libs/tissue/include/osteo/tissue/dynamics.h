@@ -1,0 +1,69 @@
+// The fast model in time: explicit steps, vectorised, with a time step that is known to be stable.
+#pragma once
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "osteo/tissue/tissue_model.h"
+
+namespace osteo {
+
+struct DynamicsOptions {
+  double density_kg_m3 = 1000;
+  double damping_per_s = 0;   ///< viscous: forces of -damping * mass * velocity; 0: energy is kept
+  double step_share = 0.9;    ///< of the certified limit
+  double least_step_s = 0;    ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
+};
+
+/// A ball that pushes points out of itself.
+struct BallTool {
+  Vec3 centre_mm;
+  double radius_mm = 2;
+  double stiffness_n_per_mm = 1;  ///< of each point it meets
+};
+
+/// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the highest
+/// frequency at rest, with a quarter more for stretch.
+/// Lumped masses. A place that is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to rounding. The same bits for any instruction set.
+template <class Real>
+class TissueDynamics {
+ public:
+  /// Errors: usage for a density not above 0, or a fixed point that is not there.
+  TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options = {});
+  ~TissueDynamics();
+
+  void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
+  void set_tool(const std::optional<BallTool>& tool);
+  void set_position(std::uint32_t point, Vec3 at_mm);
+  /// Cuts off tetrahedra: their voxels' constraints go, without a restart. O(constraints).
+  void remove_constraints(std::span<const std::uint32_t> constraints);
+
+  /// Returns the force on the tool in the last step, N.
+  Vec3 step(int steps = 1);
+
+  [[nodiscard]] double step_s() const;
+  [[nodiscard]] std::vector<Vec3> positions_mm() const;
+  [[nodiscard]] std::size_t point_count() const;
+  /// Largest unbalanced force on a free point over the largest load (or 1 N): at rest when small and kinetic energy is too.
+  [[nodiscard]] double residual() const;
+  [[nodiscard]] double kinetic_mj() const;
+  [[nodiscard]] double elastic_mj() const;
+  [[nodiscard]] Vec3 momentum_n_s() const;
+
+  struct Counts {
+    std::uint64_t not_finite = 0;       ///< points put back where they were because their place was no number
+    std::uint64_t made_heavier = 0;     ///< points, for least_step_s
+  };
+  [[nodiscard]] const Counts& counts() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// "avx512", "avx2" or "base"; OSTEO_SIMD=scalar asks for the last.
+[[nodiscard]] const char* tissue_simd_name();
+
+}  // namespace osteo

@@ -1,0 +1,356 @@
+#include "osteo/tissue/dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+#include <type_traits>
+
+#include "dynamics_kernel.h"
+#include "osteo/base/error.h"
+
+namespace osteo {
+namespace {
+
+enum class Isa { base, avx2, avx512 };
+Isa chosen() {
+  static const Isa isa = [] {
+#if defined(__x86_64__)
+    const char* const wish = std::getenv("OSTEO_SIMD");
+    const std::string_view most = wish != nullptr ? wish : "avx512";
+    if (most == "avx512" && __builtin_cpu_supports("avx512f")) return Isa::avx512;
+    if (most != "scalar" && __builtin_cpu_supports("avx2")) return Isa::avx2;
+#endif
+    return Isa::base;
+  }();
+  return isa;
+}
+
+template <class Real>
+tissue::ForceFunction<Real> force_function() {
+  if constexpr (std::is_same_v<Real, float>) {
+    switch (chosen()) {
+#if defined(__x86_64__)
+      case Isa::avx512:
+        return tissue::avx512::forces_float;
+      case Isa::avx2:
+        return tissue::avx2::forces_float;
+#endif
+      default:
+        return tissue::base::forces_float;
+    }
+  } else {
+    switch (chosen()) {
+#if defined(__x86_64__)
+      case Isa::avx512:
+        return tissue::avx512::forces_double;
+      case Isa::avx2:
+        return tissue::avx2::forces_double;
+#endif
+      default:
+        return tissue::base::forces_double;
+    }
+  }
+}
+
+constexpr double kTonnePerKg = 1e-3;  // N s2 / mm
+// Stretched or sheared, edges are stiffer against their length than at rest by their strain: so much is allowed for.
+constexpr double kStretchMargin = 1.25;
+
+}  // namespace
+
+const char* tissue_simd_name() {
+  return chosen() == Isa::avx512 ? "avx512" : chosen() == Isa::avx2 ? "avx2" : "base";
+}
+
+template <class Real>
+struct TissueDynamics<Real>::Impl {
+  TissueModel model;
+  DynamicsOptions options;
+  double dt = 0;
+  std::vector<Real> x, y, z, px, py, pz, fx, fy, fz;  // now, before, force
+  std::vector<Real> inverse_mass;                     // 1 / (N s2 / mm); 0: fixed
+  std::vector<Real> lx, ly, lz;                       // load
+  std::vector<double> mass;
+  std::vector<bool> fixed;
+  std::vector<std::uint32_t> edge, face, voxel[2], tet;
+  std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
+  tissue::Arrays<Real> arrays;
+  std::optional<BallTool> tool;
+  double load_size = 0;
+  Counts counts;
+
+  Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
+  void lay_out();
+  double certify();
+  Vec3 forces();
+};
+
+template <class Real>
+void TissueDynamics<Real>::Impl::lay_out() {
+  std::vector<const TissueModel::Constraint*> e, f, v[2], t;
+  for (const auto& c : model.constraints()) {
+    if (c.stiffness == 0 || c.rest == 0) continue;
+    (c.nodes == 2 ? e : c.nodes == 3 ? f : c.nodes == 4 ? t : v[c.voxel]).push_back(&c);
+  }
+  const auto put = [](const std::vector<const TissueModel::Constraint*>& list, std::size_t n, std::vector<std::uint32_t>& node, std::vector<Real>& k,
+                      std::vector<Real>& inverse) {
+    node.resize(n * list.size());
+    k.clear();
+    inverse.clear();
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      for (std::size_t a = 0; a < n; ++a) node[a * list.size() + i] = list[i]->node[a];
+      k.push_back(static_cast<Real>(list[i]->stiffness / list[i]->rest));
+      inverse.push_back(static_cast<Real>(1 / list[i]->rest));
+    }
+  };
+  put(e, 2, edge, edge_k, edge_inverse);
+  put(f, 3, face, face_k, face_inverse);
+  for (int s = 0; s < 2; ++s) put(v[s], 8, voxel[s], voxel_k[s], voxel_inverse[s]);
+  put(t, 4, tet, tet_k, tet_inverse);
+  arrays = {};
+  arrays.points = x.size();
+  arrays.x = x.data();
+  arrays.y = y.data();
+  arrays.z = z.data();
+  arrays.fx = fx.data();
+  arrays.fy = fy.data();
+  arrays.fz = fz.data();
+  arrays.edges = e.size();
+  arrays.edge = edge.data();
+  arrays.edge_k = edge_k.data();
+  arrays.edge_inverse = edge_inverse.data();
+  arrays.faces = f.size();
+  arrays.face = face.data();
+  arrays.face_k = face_k.data();
+  arrays.face_inverse = face_inverse.data();
+  for (int s = 0; s < 2; ++s) arrays.voxels[s] = {v[s].size(), voxel[s].data(), voxel_k[s].data(), voxel_inverse[s].data()};
+  arrays.tets = {t.size(), tet.data(), tet_k.data(), tet_inverse.data()};
+}
+
+// Limit of the step: 2 / omega, omega^2 <= max over points of (1/m) sum over its constraints of k |grad_i C| sum_j |grad_j C|.
+template <class Real>
+double TissueDynamics<Real>::Impl::certify() {
+  std::vector<double> row(x.size());
+  Vec3 local[8];
+  double g[24];
+  for (std::size_t c = 0; c < model.element_count(); ++c) {
+    const auto& k = model.constraints()[c];
+    if (k.stiffness == 0 || k.rest == 0) continue;
+    // The gradient of k/2 C^2 at a strain of 1 is k grad C: taken where every length is doubled, its direction at rest.
+    const auto nodes = model.nodes(c);
+    for (std::size_t a = 0; a < nodes.size(); ++a) local[a] = model.rest()[nodes[a]] * 2;
+    model.element(c, local, g, nullptr);
+    // q at twice the size: lengths 2, areas 4, volumes 8 times; C = 1, 3, 7; grad q 1, 2, 4 times.
+    const double over = k.nodes == 2 ? 1 : k.nodes == 3 ? 6 : 28;
+    double norm[8], sum = 0;
+    for (std::size_t a = 0; a < nodes.size(); ++a) {
+      norm[a] = std::sqrt(g[3 * a] * g[3 * a] + g[3 * a + 1] * g[3 * a + 1] + g[3 * a + 2] * g[3 * a + 2]) / over / k.stiffness;
+      sum += norm[a];
+    }
+    for (std::size_t a = 0; a < nodes.size(); ++a) row[nodes[a]] += k.stiffness * norm[a] * sum;
+  }
+  double most = 0;
+  const double heaviest = options.least_step_s > 0 ? 4 / (options.least_step_s * options.least_step_s) : INFINITY;
+  for (std::size_t p = 0; p < row.size(); ++p) {
+    if (fixed[p] || mass[p] == 0) continue;
+    double omega2 = kStretchMargin * row[p] / mass[p];
+    if (options.step_share * options.step_share * heaviest < omega2) {
+      mass[p] *= omega2 / (options.step_share * options.step_share * heaviest);
+      omega2 = options.step_share * options.step_share * heaviest;
+      ++counts.made_heavier;
+    }
+    most = std::max(most, omega2);
+  }
+  return most > 0 ? options.step_share * 2 / std::sqrt(most) : 1e-3;
+}
+
+template <class Real>
+TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options)
+    : impl_(std::make_unique<Impl>(model, options)) {
+  Impl& m = *impl_;
+  if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
+  const std::size_t n = model.point_count();
+  m.fixed.assign(n, false);
+  for (const std::uint32_t p : fixed) {
+    if (p >= n) throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(n));
+    m.fixed[p] = true;
+  }
+  m.mass.assign(n, 0);
+  for (const auto& t : model.tets()) {
+    const auto& r = model.rest();
+    const double volume = dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 6;
+    for (const std::uint32_t p : t) m.mass[p] += volume * 1e-9 * options.density_kg_m3 * kTonnePerKg / 4;
+  }
+  for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz}) v->assign(n, 0);
+  for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
+  m.lay_out();
+  m.dt = m.certify();
+  m.inverse_mass.assign(n, 0);
+  for (std::size_t p = 0; p < n; ++p) {
+    if (!m.fixed[p] && m.mass[p] > 0) m.inverse_mass[p] = static_cast<Real>(1 / m.mass[p]);
+  }
+}
+
+template <class Real>
+TissueDynamics<Real>::~TissueDynamics() = default;
+
+template <class Real>
+void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces) {
+  Impl& m = *impl_;
+  for (auto* const v : {&m.lx, &m.ly, &m.lz}) std::fill(v->begin(), v->end(), Real(0));
+  m.load_size = 0;
+  for (const auto& [p, f] : forces) {
+    if (p >= m.x.size() || !std::isfinite(dot(f, f))) throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
+    m.lx[p] += static_cast<Real>(f.x);
+    m.ly[p] += static_cast<Real>(f.y);
+    m.lz[p] += static_cast<Real>(f.z);
+    m.load_size = std::max(m.load_size, length(f));
+  }
+}
+
+template <class Real>
+void TissueDynamics<Real>::set_tool(const std::optional<BallTool>& tool) {
+  impl_->tool = tool;
+}
+
+template <class Real>
+void TissueDynamics<Real>::set_position(std::uint32_t p, Vec3 at) {
+  Impl& m = *impl_;
+  m.x[p] = m.px[p] = static_cast<Real>(at.x);
+  m.y[p] = m.py[p] = static_cast<Real>(at.y);
+  m.z[p] = m.pz[p] = static_cast<Real>(at.z);
+}
+
+template <class Real>
+void TissueDynamics<Real>::remove_constraints(std::span<const std::uint32_t> constraints) {
+  Impl& m = *impl_;
+  for (const std::uint32_t c : constraints) {
+    if (c < m.model.element_count()) m.model.set_stiffness(c, 0);
+  }
+  m.lay_out();  // what is gone only lowers the frequencies: the step stays
+}
+
+template <class Real>
+Vec3 TissueDynamics<Real>::Impl::forces() {
+  static const auto function = force_function<Real>();
+  std::copy(lx.begin(), lx.end(), fx.begin());
+  std::copy(ly.begin(), ly.end(), fy.begin());
+  std::copy(lz.begin(), lz.end(), fz.begin());
+  function(arrays);
+  Vec3 on_tool{};
+  if (!tool) return on_tool;
+  const Real cx = static_cast<Real>(tool->centre_mm.x), cy = static_cast<Real>(tool->centre_mm.y), cz = static_cast<Real>(tool->centre_mm.z);
+  const Real r = static_cast<Real>(tool->radius_mm), k = static_cast<Real>(tool->stiffness_n_per_mm);
+  for (std::size_t p = 0; p < x.size(); ++p) {
+    const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz, square = dx * dx + dy * dy + dz * dz;
+    if (!(square < r * r) || !(square > 0)) continue;
+    const Real far = std::sqrt(square), push = k * (r - far) / far;
+    fx[p] += push * dx;
+    fy[p] += push * dy;
+    fz[p] += push * dz;
+    on_tool -= Vec3{static_cast<double>(push * dx), static_cast<double>(push * dy), static_cast<double>(push * dz)};
+  }
+  return on_tool;
+}
+
+template <class Real>
+Vec3 TissueDynamics<Real>::step(int steps) {
+  Impl& m = *impl_;
+  Vec3 on_tool{};
+  for (int s = 0; s < steps; ++s) {
+    on_tool = m.forces();
+    // The tool's points are stiffer: their own limit.
+    const double tool_k = m.tool ? m.tool->stiffness_n_per_mm : 0;
+    const Real a = static_cast<Real>(0.5 * m.options.damping_per_s * m.dt), keep = 1 - a, whole = 1 / (1 + a);
+    const Real dt2 = static_cast<Real>(m.dt * m.dt);
+    const Real tool_limit = static_cast<Real>(tool_k > 0 ? 1 / (tool_k * m.dt * m.dt) : 1e30);
+    for (std::size_t p = 0; p < m.x.size(); ++p) {
+      // A point lighter than the tool's stiffness allows is moved as if it were heavier.
+      const Real w = dt2 * std::min(m.inverse_mass[p], tool_limit);
+      const Real nx = (2 * m.x[p] - keep * m.px[p] + w * m.fx[p]) * whole, ny = (2 * m.y[p] - keep * m.py[p] + w * m.fy[p]) * whole,
+                 nz = (2 * m.z[p] - keep * m.pz[p] + w * m.fz[p]) * whole;
+      m.px[p] = m.x[p];
+      m.py[p] = m.y[p];
+      m.pz[p] = m.z[p];
+      if (m.inverse_mass[p] == 0) continue;
+      if (std::isfinite(nx + ny + nz)) {
+        m.x[p] = nx;
+        m.y[p] = ny;
+        m.z[p] = nz;
+      } else {
+        ++m.counts.not_finite;
+      }
+    }
+  }
+  return on_tool;
+}
+
+template <class Real>
+double TissueDynamics<Real>::step_s() const {
+  return impl_->dt;
+}
+template <class Real>
+std::size_t TissueDynamics<Real>::point_count() const {
+  return impl_->x.size();
+}
+template <class Real>
+const typename TissueDynamics<Real>::Counts& TissueDynamics<Real>::counts() const {
+  return impl_->counts;
+}
+
+template <class Real>
+std::vector<Vec3> TissueDynamics<Real>::positions_mm() const {
+  const Impl& m = *impl_;
+  std::vector<Vec3> all;
+  for (std::size_t p = 0; p < m.x.size(); ++p)
+    all.push_back({static_cast<double>(m.x[p]), static_cast<double>(m.y[p]), static_cast<double>(m.z[p])});
+  return all;
+}
+
+template <class Real>
+double TissueDynamics<Real>::residual() const {
+  Impl& m = *impl_;
+  m.forces();
+  double most = 0;
+  for (std::size_t p = 0; p < m.x.size(); ++p) {
+    if (m.inverse_mass[p] == 0) continue;
+    most = std::max(most, std::hypot(static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])));
+  }
+  return most / (m.load_size > 0 ? m.load_size : 1);
+}
+
+template <class Real>
+double TissueDynamics<Real>::kinetic_mj() const {
+  Impl& m = *impl_;
+  m.forces();
+  double sum = 0;
+  for (std::size_t p = 0; p < m.x.size(); ++p) {
+    // The velocity now, half a step after that between the last two places.
+    const Vec3 f{static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])};
+    const Vec3 v = Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} / m.dt +
+                   f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
+    sum += m.fixed[p] ? 0 : 0.5 * m.mass[p] * dot(v, v);
+  }
+  return sum;
+}
+
+template <class Real>
+double TissueDynamics<Real>::elastic_mj() const {
+  return total_energy(impl_->model, positions_mm());
+}
+
+template <class Real>
+Vec3 TissueDynamics<Real>::momentum_n_s() const {
+  const Impl& m = *impl_;
+  Vec3 sum{};
+  for (std::size_t p = 0; p < m.x.size(); ++p) {
+    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} * (m.mass[p] / m.dt);
+  }
+  return sum;
+}
+
+template class TissueDynamics<float>;
+template class TissueDynamics<double>;
+
+}  // namespace osteo

@@ -1,0 +1,2 @@
+#define OSTEO_ISA avx2
+#include "dynamics_loops.h"

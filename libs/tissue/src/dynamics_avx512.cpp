@@ -1,0 +1,2 @@
+#define OSTEO_ISA avx512
+#include "dynamics_loops.h"

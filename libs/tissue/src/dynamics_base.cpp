@@ -1,0 +1,2 @@
+#define OSTEO_ISA base
+#include "dynamics_loops.h"
