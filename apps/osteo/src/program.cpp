@@ -13,6 +13,7 @@
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/meshing/stages.h"
 #include "osteo/tets/skin.h"
+#include "osteo/tissue/stages.h"
 #include "osteo/view/snapshot.h"
 
 namespace osteo {
@@ -46,6 +47,9 @@ cli::Program make_osteo_program() {
   p.registry.add<VoxelizeStage>();
   p.registry.add<TetrahedralizeStage>();
   p.registry.add<SkinStage>();
+  p.registry.add<FemStage>();
+  p.registry.add<CalibrateStage>();
+  p.registry.add<SimulateStage>();
   p.registry.add<SawStage>();
   p.registry.add<PiecesStage>();
   p.registry.add<CurveStage>();

@@ -25,7 +25,7 @@ constexpr std::array<Suffixes, 7> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.
                                              {DataKind::grid, ".vdb"},
                                              {DataKind::surface, ".ply .stl .obj .glb .3mf .vtp .dcm"},
                                              {DataKind::picture, ".png"},
-                                             {DataKind::document, ".json"},
+                                             {DataKind::document, ".json .inp"},
                                              {DataKind::tets, ".vtu .node .ele"}}};
 
 bool accepts(std::span<const DataKind> kinds, DataKind kind) {
@@ -66,6 +66,10 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   if (path.extension() == ".png") {
     if (!accepts(accepted, DataKind::picture)) throw wrong(DataKind::picture);
     return load_picture(path);
+  }
+  if (path.extension() == ".json") {
+    if (!accepts(accepted, DataKind::document)) throw wrong(DataKind::document);
+    return Document{read_text(path)};
   }
   if (fs::is_directory(path)) {
     throw Error(ExitCode::usage, "'" + path.string() + "' is a folder; " + kinds_text(accepted) + " is wanted",

@@ -18,6 +18,53 @@ struct Share {
   std::array<double, 8> weight{};
 };
 
+std::size_t grid_points(const std::array<int, 3>& grid) {
+  std::size_t nodes = 1;
+  for (const int n : grid) {
+    if (n < 1) throw Error(ExitCode::usage, "the grid of stiffness needs at least one point along each axis");
+    nodes *= static_cast<std::size_t>(n);
+  }
+  return nodes;
+}
+
+// Of each constraint, by its middle in the body's box.
+std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& grid) {
+  const auto& x = model.rest();
+  Vec3 lo{1e300, 1e300, 1e300}, hi = lo * -1;
+  for (const Vec3& p : x)
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], p[a]);
+      hi[a] = std::max(hi[a], p[a]);
+    }
+  std::vector<Share> all;
+  for (const auto& c : model.constraints()) {
+    Vec3 middle{};
+    for (std::size_t n = 0; n < c.nodes; ++n) middle += x[c.node[n]] / static_cast<double>(c.nodes);
+    int cell[3];
+    double t[3];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double at = grid[a] > 1 ? (middle[a] - lo[a]) / (hi[a] - lo[a]) * (grid[a] - 1) : 0;
+      cell[a] = std::clamp(static_cast<int>(at), 0, std::max(0, grid[a] - 2));
+      t[a] = grid[a] > 1 ? at - cell[a] : 0;
+    }
+    Share s;
+    for (std::size_t n = 0; n < 8; ++n) {
+      double w = 1;
+      std::size_t at = 0, stride = 1;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int up = static_cast<int>(n >> a & 1);
+        w *= up != 0 ? t[a] : 1 - t[a];
+        at += static_cast<std::size_t>(std::min(cell[a] + up, grid[a] - 1)) * stride;
+        stride *= static_cast<std::size_t>(grid[a]);
+      }
+      s.at[n] = static_cast<std::uint32_t>(at);
+      s.weight[n] = w;
+    }
+    all.push_back(s);
+  }
+  return all;
+}
+
 class Fit {
  public:
   Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
@@ -128,47 +175,17 @@ class Fit {
     if (const std::uint32_t j = parameter_of_[nodes_ + kind]; j != kNone) f(j, 1.0);
   }
   void lay_grid() {
-    const auto& x = model_.rest();
-    Vec3 lo{1e300, 1e300, 1e300}, hi = lo * -1;
-    for (const Vec3& p : x)
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], p[a]);
-        hi[a] = std::max(hi[a], p[a]);
-      }
-    nodes_ = 1;
-    for (const int n : options_.grid) {
-      if (n < 1) throw Error(ExitCode::usage, "the grid of stiffness needs at least one point along each axis");
-      nodes_ *= static_cast<std::size_t>(n);
-    }
+    nodes_ = grid_points(options_.grid);
+    share_ = shares(model_, options_.grid);
     std::vector<bool> near(numbers());
-    for (const auto& c : model_.constraints()) {
-      Vec3 middle{};
-      for (std::size_t n = 0; n < c.nodes; ++n) middle += x[c.node[n]] / static_cast<double>(c.nodes);
-      int cell[3];
-      double t[3];
-      for (std::size_t a = 0; a < 3; ++a) {
-        const int n = options_.grid[a];
-        const double at = n > 1 ? (middle[a] - lo[a]) / (hi[a] - lo[a]) * (n - 1) : 0;
-        cell[a] = std::clamp(static_cast<int>(at), 0, std::max(0, n - 2));
-        t[a] = n > 1 ? at - cell[a] : 0;
-      }
-      Share s;
+    for (std::size_t c = 0; c < share_.size(); ++c) {
+      const auto kind = static_cast<std::size_t>(model_.constraints()[c].kind);
       for (std::size_t n = 0; n < 8; ++n) {
-        double w = 1;
-        std::size_t at = 0, stride = 1;
-        for (std::size_t a = 0; a < 3; ++a) {
-          const int up = static_cast<int>(n >> a & 1);
-          w *= up != 0 ? t[a] : 1 - t[a];
-          at += static_cast<std::size_t>(std::min(cell[a] + up, options_.grid[a] - 1)) * stride;
-          stride *= static_cast<std::size_t>(options_.grid[a]);
-        }
-        s.at[n] = static_cast<std::uint32_t>(at);
-        s.weight[n] = w;
+        const std::size_t at = share_[c].at[n];
         // A map of one point is the classes' own factors.
-        if (w > 1e-3 && !(options_.shared_grid && nodes_ == 1)) near[options_.shared_grid ? at : at * kTissueClasses + static_cast<std::size_t>(c.kind)] = true;
+        if (share_[c].weight[n] > 1e-3 && !(options_.shared_grid && nodes_ == 1)) near[options_.shared_grid ? at : at * kTissueClasses + kind] = true;
       }
-      if (options_.shared_grid) near[nodes_ + static_cast<std::size_t>(c.kind)] = true;
-      share_.push_back(s);
+      if (options_.shared_grid) near[nodes_ + kind] = true;
     }
     parameter_of_.assign(numbers(), kNone);
     for (std::uint32_t i = 0; i < near.size(); ++i) {
@@ -266,6 +283,22 @@ CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const V
   double left = 0;
   for (std::size_t p = 0; p < rest.size(); ++p) left += (turn * (vec(shape[p]) - a) + b - vec(truth[p])).squaredNorm();
   return {std::sqrt(off / moved), std::sqrt(left / moved), std::sqrt(off / n), std::sqrt(moved / n)};
+}
+
+TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid, std::span<const double> log_factors) {
+  if (log_factors.size() != grid_points(grid) * kTissueClasses)
+    throw Error(ExitCode::usage, std::to_string(log_factors.size()) + " factors do not fit a grid of " + std::to_string(grid_points(grid)) + " points");
+  TissueModel scaled = model;
+  const std::vector<Share> share = shares(model, grid);
+  std::vector<double> factors(share.size());
+  for (std::size_t c = 0; c < share.size(); ++c) {
+    double log = 0;
+    for (std::size_t n = 0; n < 8; ++n)
+      log += share[c].weight[n] * log_factors[share[c].at[n] * kTissueClasses + static_cast<std::size_t>(model.constraints()[c].kind)];
+    factors[c] = std::exp(log);
+  }
+  scaled.scale_each(factors);
+  return scaled;
 }
 
 Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context) {

@@ -61,4 +61,7 @@ struct Calibration {
 /// factors with no equilibrium is not taken. Errors: usage when cases fix different points, or none is given.
 Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options = {}, const Context& context = {});
 
+/// The model with factors as Calibration::log_factors has them for that grid. Error(usage) when there are not as many as the grid needs.
+[[nodiscard]] TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid, std::span<const double> log_factors);
+
 }  // namespace osteo

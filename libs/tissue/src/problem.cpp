@@ -1,0 +1,101 @@
+#include "osteo/tissue/problem.h"
+
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/error.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+Vec3 vec(const ordered_json& j) {
+  return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+}
+
+std::function<bool(Vec3)> place(const ordered_json& j) {
+  if (j.contains("box_mm")) {
+    const Vec3 lo = vec(j.at("box_mm").at(0)), hi = vec(j.at("box_mm").at(1));
+    return [=](Vec3 p) { return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z; };
+  }
+  const Vec3 at = vec(j.at("at_mm"));
+  const double r = j.at("radius_mm");
+  return [=](Vec3 p) { return length(p - at) <= r; };
+}
+
+Material material(const ordered_json& j) {
+  return {j.at("young_kpa").get<double>() / 1000, j.at("poisson").get<double>()};
+}
+
+}  // namespace
+
+TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh) {
+  TissueProblem problem;
+  std::string where = "header";
+  const auto refuse = [&](const std::string& what, const std::string& advice = {}) {
+    return Error(ExitCode::usage, "the tissue problem, " + where + ": " + what, advice);
+  };
+  try {
+    const auto j = ordered_json::parse(json, nullptr, true, true);
+    if (j.at("osteotome_tissue") != 1) throw refuse("\"osteotome_tissue\" must be 1");
+    where = "material";
+    const Material general = material(j.at("material"));
+    const auto regions = j.value("regions", ordered_json::array());
+    problem.materials.assign(regions.empty() ? 1 : mesh.tets.size(), general);
+    int number = 0;
+    for (const auto& r : regions) {
+      where = "region " + std::to_string(++number);
+      const auto in = place(r);
+      const Material m = material(r);
+      std::size_t hit = 0;
+      for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        Vec3 middle{};
+        for (const std::uint32_t p : mesh.tets[t]) middle += from_floats(mesh.points_mm[p]) / 4;
+        if (!in(middle)) continue;
+        problem.materials[t] = m;
+        ++hit;
+      }
+      if (hit == 0) throw refuse("no tetrahedron lies in it", "places are LPS mm; mesh-info tells where the mesh is");
+    }
+    std::vector<bool> fixed(mesh.points_mm.size());
+    number = 0;
+    for (const auto& f : j.at("fixed")) {
+      where = "fixed " + std::to_string(++number);
+      const auto in = place(f);
+      std::size_t hit = 0;
+      for (std::uint32_t p = 0; p < fixed.size(); ++p) {
+        if (!in(from_floats(mesh.points_mm[p]))) continue;
+        ++hit;
+        if (!fixed[p]) problem.fixed.push_back(p);
+        fixed[p] = true;
+      }
+      if (hit == 0) throw refuse("no point lies in it", "places are LPS mm; mesh-info tells where the mesh is");
+    }
+    number = 0;
+    for (const auto& l : j.at("loads")) {
+      where = "load " + std::to_string(++number);
+      TissueLoad load;
+      load.fixed = problem.fixed;
+      for (const auto& f : l.at("forces")) {
+        const auto in = place(f);
+        const Vec3 total = vec(f.at("total_n"));
+        std::vector<std::uint32_t> near;
+        for (std::uint32_t p = 0; p < fixed.size(); ++p) {
+          if (!fixed[p] && in(from_floats(mesh.points_mm[p]))) near.push_back(p);
+        }
+        if (near.empty()) throw refuse("no point that can move lies where a force acts", "make its place larger");
+        for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
+      }
+      problem.load_names.push_back(l.value("name", "load " + std::to_string(number)));
+      problem.loads.push_back(std::move(load));
+    }
+    where = "loads";
+    if (problem.loads.empty()) throw refuse("there is none");
+  } catch (const nlohmann::json::exception& e) {
+    throw refuse(e.what(), "docs/tissue.md describes the file");
+  }
+  return problem;
+}
+
+}  // namespace osteo
