@@ -1,0 +1,92 @@
+// The stages of deformable tissue.
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "osteo/stage/stage.h"
+#include "osteo/tissue/fem.h"
+
+namespace osteo {
+
+template <>
+struct EnumNames<ElasticLaw> {
+  static constexpr std::array<std::string_view, 3> values{"linear", "stvk", "neo_hooke"};
+};
+enum class OrderChoice : int { automatic, t4, t10 };
+template <>
+struct EnumNames<OrderChoice> {
+  static constexpr std::array<std::string_view, 3> values{"auto", "t4", "t10"};
+};
+
+struct FemParams {
+  ElasticLaw law = ElasticLaw::neo_hooke;
+  OrderChoice order = OrderChoice::automatic;
+  std::string load;
+  int load_steps = 1;
+  double tolerance = 1e-10;
+};
+struct FemStage {
+  using Params = FemParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"law", "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains"}, p.law);
+    visit({"order", "t4: linear tetrahedra; t10: quadratic; auto: quadratic, since linear ones bend too little and lock near 0.5"}, p.order);
+    visit({"load", "name of the load (empty: the first)"}, p.load);
+    visit({"load_steps", "equal steps in which the load grows", "", 1, 1000}, p.load_steps);
+    visit({"tolerance", "residual force over load", "", 1e-14, 1e-2}, p.tolerance);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+struct CalibrateParams {
+  std::string fit;
+  ElasticLaw law = ElasticLaw::neo_hooke;
+  OrderChoice order = OrderChoice::automatic;
+  int grid_x = 1, grid_y = 1, grid_z = 1;
+  bool shared_grid = true;
+  double pull = 0.02;
+  int starts = 1;
+  int iterations = 60;
+};
+struct CalibrateStage {
+  using Params = CalibrateParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"fit", "names of the loads to fit, like 'A,B' (empty: the first); the others show how it carries over"}, p.fit);
+    visit({"law", "of the truth, by finite elements"}, p.law);
+    visit({"order", "of the truth's tetrahedra"}, p.order);
+    visit({"grid_x", "points of the map of stiffness along x (1, 1, 1: one material)", "", 1, 20}, p.grid_x);
+    visit({"grid_y", "along y", "", 1, 20}, p.grid_y);
+    visit({"grid_z", "along z", "", 1, 20}, p.grid_z);
+    visit({"shared_grid", "one map for all kinds of constraint, and one factor a kind; else a map for each kind"}, p.shared_grid);
+    visit({"pull", "towards the closed form: what the loads do not tell stays there", "", 0, 10}, p.pull);
+    visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
+    visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+struct SimulateParams {
+  std::string load;
+  double seconds = 1;
+  double density_kg_m3 = 1000;
+  double damping_per_s = 30;
+  double least_step_ms = 0;
+  bool until_rest = true;
+};
+struct SimulateStage {
+  using Params = SimulateParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"load", "name of the load (empty: the first)"}, p.load);
+    visit({"seconds", "of simulated time, at most", "s", 1e-4, 1000}, p.seconds);
+    visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
+    visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
+    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0, 100}, p.least_step_ms);
+    visit({"until_rest", "ends when the forces balance to a thousandth of the load and little moves"}, p.until_rest);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+}  // namespace osteo
