@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin saw pieces curve snapshot structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -15,6 +15,10 @@ _osteo() {
     "voxelize --margin") COMPREPLY=($(compgen -W "exact thesis " -- "$cur")); return ;;
     "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
     "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
+    "fem --law") COMPREPLY=($(compgen -W "linear stvk neo_hooke " -- "$cur")); return ;;
+    "fem --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
+    "calibrate --law") COMPREPLY=($(compgen -W "linear stvk neo_hooke " -- "$cur")); return ;;
+    "calibrate --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
@@ -42,6 +46,9 @@ _osteo() {
     voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
+    fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out" ;;
+    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --pull --starts --iterations --deformed-out" ;;
+    simulate) flags="$flags --xml --describe --load --seconds --density-kg-m3 --damping-per-s --least-step-ms --until-rest --constants --report-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
     pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
