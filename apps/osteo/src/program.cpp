@@ -13,6 +13,7 @@
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/meshing/stages.h"
 #include "osteo/tets/skin.h"
+#include "osteo/tissue/calibrate.h"
 #include "osteo/tissue/stages.h"
 #include "osteo/view/snapshot.h"
 
@@ -25,10 +26,12 @@ cli::Program make_osteo_program() {
       "Osteotome's own sources: Apache-2.0. This binary links VTK, vtk-dicom, GDCM, DCMTK, libarchive, OpenVDB, oneTBB, hidapi, HDF5 and "
       "zlib (all "
       "permissive or MPL-2.0)";
-  if (const std::string parts(copyleft_parts()); !parts.empty()) {
+  std::string parts(copyleft_parts());
+  if (has_ceres()) parts += std::string(parts.empty() ? "" : " and ") + "Ceres, whose package brings parts of SuiteSparse under the GPL";
+  if (!parts.empty()) {
     p.licence += ",\nand " + parts + ", so that as a whole it falls under the " +
                  (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
-                 "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF for one that does not.\n";
+                 "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF for one that does not.\n";
   } else {
     p.licence += ";\nit contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n";
   }

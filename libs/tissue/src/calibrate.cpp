@@ -1,6 +1,8 @@
 #include "osteo/tissue/calibrate.h"
 
+#ifdef OSTEO_WITH_CERES
 #include <ceres/ceres.h>
+#endif
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -64,6 +66,8 @@ std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& gr
   }
   return all;
 }
+
+#ifdef OSTEO_WITH_CERES
 
 class Fit {
  public:
@@ -261,6 +265,8 @@ class Watch final : public ceres::IterationCallback {
   const Context& context_;
 };
 
+#endif
+
 }  // namespace
 
 CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth) {
@@ -299,6 +305,22 @@ TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>&
   }
   scaled.scale_each(factors);
   return scaled;
+}
+
+#ifndef OSTEO_WITH_CERES
+
+bool has_ceres() {
+  return false;
+}
+
+Calibration calibrate(TissueModel&, std::span<const CalibrationCase>, const CalibrateOptions&, const Context&) {
+  throw Error(ExitCode::failed, "this build cannot calibrate: it was made without Ceres", "build with -DOSTEO_CERES=ON");
+}
+
+#else
+
+bool has_ceres() {
+  return true;
 }
 
 Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context) {
@@ -392,5 +414,7 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }
+
+#endif
 
 }  // namespace osteo

@@ -33,6 +33,7 @@ struct Problem {
 
 // What a model with known factors does is explained by those factors.
 TEST(Calibrate, FindsFactorsThatAreThere) {
+  if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const Problem p;
   TissueModel truth = p.model();
   truth.scale({1.4, 0.7, 20, 2});
@@ -115,6 +116,7 @@ TEST(Calibrate, ErrorMetrics) {
 }
 
 TEST(Calibrate, ErrorsSayWhat) {
+  if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const Problem p;
   TissueModel model = p.model();
   EXPECT_THROW(calibrate(model, {}), Error);

@@ -58,8 +58,11 @@ struct Calibration {
 
 /// Fits `model` (which is left calibrated) by a trust region (Ceres: Levenberg and Marquardt, for many factors dogleg): residuals over all points and cases, exact Jacobians through
 /// the equilibrium (implicit function theorem: one factorisation, one back-solve a parameter). Equilibria start from the last ones. A step to
-/// factors with no equilibrium is not taken. Errors: usage when cases fix different points, or none is given.
+/// factors with no equilibrium is not taken. Errors: usage when cases fix different points, or none is given; failed in a build without Ceres.
 Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options = {}, const Context& context = {});
+
+/// Whether this build can calibrate.
+[[nodiscard]] bool has_ceres();
 
 /// The model with factors as Calibration::log_factors has them for that grid. Error(usage) when there are not as many as the grid needs.
 [[nodiscard]] TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid, std::span<const double> log_factors);
