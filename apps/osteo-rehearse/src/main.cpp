@@ -141,6 +141,7 @@ struct WindowCommand {
       // In front of the bone on the patient's left, where the window looks.
       auto device = hands.make(in_front_of(world, tool), tool);
       options.haptics.device = device->traits();
+      options.soft = soft_body_of(the_case.folder);
       rehearsal = std::make_unique<Rehearsal>(std::move(world), std::move(device), options, io.context);
       rehearsal->start();
     };

@@ -100,10 +100,13 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.session_file = session.stream();
   options.follow = {true, p.pieces, p.dust};
   options.actions = actions_of(script, p.rate_hz);
+  options.soft = soft_body_of(the_case.folder);
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
   Rehearsal rehearsal(std::move(world), std::move(device), options, io.context);
   const auto draw = [&](const char* name) {
-    rehearsal.look([&](const World& w, Follower& f) { save_picture(draw_world(w, f, rehearsal.structures(), view), folder / name); });
+    rehearsal.look([&](const World& w, Follower& f) {
+      save_picture(draw_world(w, f, rehearsal.structures(), view, rehearsal.soft()), folder / name);
+    });
   };
   draw("before.png");
   RehearsalSummary s;
@@ -309,6 +312,14 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   if (p.dust) {
     timed("bone dust (a copy of the bone; more where it lies)", "follower",
           [&] { return over_bodies(*world, [](const BrickGrid& b) { return BrickGrid(b).memory_bytes(); }); });
+  }
+  if (std::shared_ptr<SoftBody> soft; fs::exists(the_case.folder / "tissue.vtu")) {
+    timed("soft tissue", "follower", [&] {
+      soft = soft_body_of(the_case.folder);
+      return soft->memory_bytes();
+    });
+    if (soft->slow_motion() < 1)
+      io.context.warn("soft tissue runs at " + format_number(std::round(100 * soft->slow_motion())) + " % of real time");
   }
   std::unique_ptr<HapticRenderer> renderer;
   HapticScene touched;

@@ -97,6 +97,15 @@ SceneAction SceneAction::irrigate(Vec3 at_mm, double radius_mm, double share_per
   return a;
 }
 
+SceneAction SceneAction::yield(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm) {
+  SceneAction a = plain(ActionKind::yield);
+  put(a.values, 0, at_mm);
+  put(a.values, 3, normal);
+  a.values[6] = force_n;
+  a.values[7] = stiffness_n_per_mm;
+  return a;
+}
+
 RigidTransform SceneAction::transform() const {
   RigidTransform t;
   for (std::size_t c = 0; c < 3; ++c) t.rotation.column[c] = vector_at(values, 3 * c);
@@ -105,8 +114,8 @@ RigidTransform SceneAction::transform() const {
 }
 
 std::string_view name_of(ActionKind kind) {
-  static constexpr std::array<std::string_view, 13> kNames{"?",      "hold",   "resume", "saw",     "split",    "move", "grip",
-                                                           "attach", "detach", "open",   "suction", "irrigate", "undo"};
+  static constexpr std::array<std::string_view, 14> kNames{"?",      "hold",   "resume", "saw",     "split",    "move", "grip",
+                                                           "attach", "detach", "open",   "suction", "irrigate", "undo", "yield"};
   const auto n = static_cast<std::size_t>(kind);
   return kNames[n < kNames.size() ? n : 0];
 }

@@ -159,6 +159,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       return undo();
     case ActionKind::suction:
     case ActionKind::irrigate:
+    case ActionKind::yield:
       held_ = was_held;
       break;
     case ActionKind::grip:

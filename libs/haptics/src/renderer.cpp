@@ -59,6 +59,13 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, BrickGrid& bone, const 
 
 HapticRenderer::~HapticRenderer() = default;
 
+void HapticRenderer::feel(const SceneAction& a) noexcept {
+  soft_.at_mm = {a.values[0], a.values[1], a.values[2]};
+  soft_.normal = {a.values[3], a.values[4], a.values[5]};
+  soft_.force_n = a.values[6];
+  soft_.stiffness_n_per_mm = std::min(a.values[7], setup_.params.contact.stiffness_n_per_mm);
+}
+
 // The head in each body near it.
 void HapticRenderer::touch(const DeviceSample& pose) noexcept {
   const Burr& burr = burr_library()[pose.tool];
@@ -239,6 +246,12 @@ HapticRenderer::Step HapticRenderer::step(const DeviceSample& sample) noexcept {
 
   Vec3 elastic = contact_.force_n, torque = contact_.torque_n_mm;
   if (with.shaft && usable && !scene_->plate) shaft(at, axis, elastic, torque);
+  if (usable && !(soft_.normal == Vec3{})) {
+    const double push =
+        std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at, soft_.normal), 0.0, setup_.params.contact.max_force_n);
+    elastic += soft_.normal * push;
+    if (push > 0) flags_ |= kSoftContact;
+  }
   Vec3 effects{};
   if (pose.drill_on != 0 && usable) {
     const double running = with.speed_rpm > 0 ? 1 : 0;

@@ -11,7 +11,8 @@ bool takes_time(const SceneAction& a) {
   return a.is(ActionKind::saw) || a.is(ActionKind::split) || a.is(ActionKind::undo);
 }
 bool changes_what_is_touched(const SceneAction& a) {
-  return !(a.is(ActionKind::hold) || a.is(ActionKind::resume) || a.is(ActionKind::suction) || a.is(ActionKind::irrigate));
+  return !(a.is(ActionKind::hold) || a.is(ActionKind::resume) || a.is(ActionKind::suction) || a.is(ActionKind::irrigate) ||
+           a.is(ActionKind::yield));
 }
 
 }  // namespace

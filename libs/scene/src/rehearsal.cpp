@@ -23,7 +23,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
     header.dust = options_.follow.dust;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(), options_.session_file, header);
   }
-  if (options_.follow.surface || options_.follow.pieces || options_.follow.dust) reader_ = &stream_.add_reader();
+  if (options_.follow.surface || options_.follow.pieces || options_.follow.dust || options_.soft) reader_ = &stream_.add_reader();
   follower_ = std::make_unique<Follower>(operation_.world(), options_.follow, options_.rate_hz, context);
   pieces_ = static_cast<int>(follower_->large_pieces().size());
 }
@@ -69,6 +69,15 @@ void Rehearsal::perform(const SceneAction& action, bool live) {
   }
 }
 
+// Soft tissue a hundredth of a second further, where the tool is now.
+std::optional<SceneAction> Rehearsal::move_soft() {
+  const std::uint64_t tick = operation_.ticks();
+  const TickRecord& now = follower_->latest();
+  if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
+  soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
+  return options_.soft->update(from_floats(now.device.position_mm), burr_library()[now.device.tool].head().largest_radius_mm());
+}
+
 void Rehearsal::act(const SceneAction& action) {
   const std::lock_guard lock(queue_mutex_);
   // Of several moves of the same kind that nobody has seen yet the last is enough.
@@ -90,12 +99,13 @@ std::string Rehearsal::take_refusal() {
 
 void Rehearsal::follow() {
   while (!stop_) {
+    std::optional<SceneAction> action;
     {
       const std::lock_guard lock(mutex_);
       drain();
+      if (running()) action = move_soft();
     }
-    std::optional<SceneAction> action;
-    {
+    if (!action) {
       const std::lock_guard lock(queue_mutex_);
       if (!timed_.empty() && timed_.front().tick <= operation_.ticks()) {
         action = timed_.front();
@@ -135,6 +145,10 @@ RehearsalSummary Rehearsal::run_to_end(const Context& context) {
     if (!timed_.empty() && timed_.front().tick <= operation_.ticks() && device_->active(operation_.ticks())) {
       perform(timed_.front(), false);
       timed_.pop_front();
+    } else if (options_.soft && operation_.ticks() >= soft_tick_ && device_->active(operation_.ticks())) {
+      // One action a tick: what was to be done comes first.
+      drain();
+      if (const auto yield = move_soft()) perform(*yield, false);
     }
     if (!operation_.step(0)) break;
     if (operation_.ticks() % 64 != 0) continue;

@@ -78,6 +78,7 @@ struct TissueDynamics<Real>::Impl {
   tissue::Arrays<Real> arrays;
   std::optional<BallTool> tool;
   double load_size = 0;
+  int met = 0;
   Counts counts;
 
   Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
@@ -93,8 +94,8 @@ void TissueDynamics<Real>::Impl::lay_out() {
     if (c.stiffness == 0 || c.rest == 0) continue;
     (c.nodes == 2 ? e : c.nodes == 3 ? f : c.nodes == 4 ? t : v[c.voxel]).push_back(&c);
   }
-  const auto put = [](const std::vector<const TissueModel::Constraint*>& list, std::size_t n, std::vector<std::uint32_t>& node, std::vector<Real>& k,
-                      std::vector<Real>& inverse) {
+  const auto put = [](const std::vector<const TissueModel::Constraint*>& list, std::size_t n, std::vector<std::uint32_t>& node,
+                      std::vector<Real>& k, std::vector<Real>& inverse) {
     node.resize(n * list.size());
     k.clear();
     inverse.clear();
@@ -201,7 +202,8 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
   for (auto* const v : {&m.lx, &m.ly, &m.lz}) std::fill(v->begin(), v->end(), Real(0));
   m.load_size = 0;
   for (const auto& [p, f] : forces) {
-    if (p >= m.x.size() || !std::isfinite(dot(f, f))) throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
+    if (p >= m.x.size() || !std::isfinite(dot(f, f)))
+      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
     m.lx[p] += static_cast<Real>(f.x);
     m.ly[p] += static_cast<Real>(f.y);
     m.lz[p] += static_cast<Real>(f.z);
@@ -239,12 +241,15 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   std::copy(lz.begin(), lz.end(), fz.begin());
   function(arrays);
   Vec3 on_tool{};
+  met = 0;
   if (!tool) return on_tool;
-  const Real cx = static_cast<Real>(tool->centre_mm.x), cy = static_cast<Real>(tool->centre_mm.y), cz = static_cast<Real>(tool->centre_mm.z);
+  const Real cx = static_cast<Real>(tool->centre_mm.x), cy = static_cast<Real>(tool->centre_mm.y),
+             cz = static_cast<Real>(tool->centre_mm.z);
   const Real r = static_cast<Real>(tool->radius_mm), k = static_cast<Real>(tool->stiffness_n_per_mm);
   for (std::size_t p = 0; p < x.size(); ++p) {
     const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz, square = dx * dx + dy * dy + dz * dz;
     if (!(square < r * r) || !(square > 0)) continue;
+    ++met;
     const Real far = std::sqrt(square), push = k * (r - far) / far;
     fx[p] += push * dx;
     fy[p] += push * dy;
@@ -291,6 +296,10 @@ double TissueDynamics<Real>::step_s() const {
   return impl_->dt;
 }
 template <class Real>
+int TissueDynamics<Real>::met_by_tool() const {
+  return impl_->met;
+}
+template <class Real>
 std::size_t TissueDynamics<Real>::point_count() const {
   return impl_->x.size();
 }
@@ -328,8 +337,9 @@ double TissueDynamics<Real>::kinetic_mj() const {
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     // The velocity now, half a step after that between the last two places.
     const Vec3 f{static_cast<double>(m.fx[p]), static_cast<double>(m.fy[p]), static_cast<double>(m.fz[p])};
-    const Vec3 v = Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} / m.dt +
-                   f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
+    const Vec3 v =
+        Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} / m.dt +
+        f * (0.5 * m.dt * static_cast<double>(m.inverse_mass[p]));
     sum += m.fixed[p] ? 0 : 0.5 * m.mass[p] * dot(v, v);
   }
   return sum;
@@ -345,7 +355,8 @@ Vec3 TissueDynamics<Real>::momentum_n_s() const {
   const Impl& m = *impl_;
   Vec3 sum{};
   for (std::size_t p = 0; p < m.x.size(); ++p) {
-    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} * (m.mass[p] / m.dt);
+    sum += Vec3{static_cast<double>(m.x[p] - m.px[p]), static_cast<double>(m.y[p] - m.py[p]), static_cast<double>(m.z[p] - m.pz[p])} *
+           (m.mass[p] / m.dt);
   }
   return sum;
 }

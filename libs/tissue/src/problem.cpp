@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
+#include "osteo/tissue/calibrate.h"
 
 namespace osteo {
 namespace {
@@ -30,7 +31,7 @@ Material material(const ordered_json& j) {
 
 }  // namespace
 
-TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh) {
+TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads) {
   TissueProblem problem;
   std::string where = "header";
   const auto refuse = [&](const std::string& what, const std::string& advice = {}) {
@@ -73,7 +74,7 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh) {
       if (hit == 0) throw refuse("no point lies in it", "places are LPS mm; mesh-info tells where the mesh is");
     }
     number = 0;
-    for (const auto& l : j.at("loads")) {
+    for (const auto& l : needs_loads ? j.at("loads") : j.value("loads", ordered_json::array())) {
       where = "load " + std::to_string(++number);
       TissueLoad load;
       load.fixed = problem.fixed;
@@ -91,11 +92,30 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh) {
       problem.loads.push_back(std::move(load));
     }
     where = "loads";
-    if (problem.loads.empty()) throw refuse("there is none");
+    if (needs_loads && problem.loads.empty()) throw refuse("there is none");
   } catch (const nlohmann::json::exception& e) {
     throw refuse(e.what(), "docs/tissue.md describes the file");
   }
   return problem;
+}
+
+TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, const std::optional<std::string>& constants_json) {
+  // One material a voxel, from those of its tetrahedra.
+  std::vector<Material> materials;
+  const std::size_t step = problem.materials.size() == 1 ? 1 : 5;
+  for (std::size_t t = 0; t < problem.materials.size(); t += step) materials.push_back(problem.materials[t]);
+  TissueModel model = TissueModel::of_voxels(points_of(mesh), tets_of(mesh), materials);
+  if (!constants_json) {
+    model.scale({1, 1, 0, 1});
+    return model;
+  }
+  try {
+    const auto j = ordered_json::parse(*constants_json);
+    if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
+    return with_log_factors(model, j.at("grid").get<std::array<int, 3>>(), j.at("log_factors").get<std::vector<double>>());
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
+  }
 }
 
 }  // namespace osteo

@@ -47,14 +47,6 @@ ordered_json moves(std::span<const Vec3> rest, std::span<const Vec3> x) {
   return {{"rms_mm", std::sqrt(sum / static_cast<double>(rest.size()))}, {"largest_mm", most}};
 }
 
-// One material a voxel, from those of its tetrahedra.
-std::vector<Material> of_voxels(const std::vector<Material>& of_tets) {
-  if (of_tets.size() == 1) return of_tets;
-  std::vector<Material> m;
-  for (std::size_t t = 0; t + 4 < of_tets.size(); t += 5) m.push_back(of_tets[t]);
-  return m;
-}
-
 Error not_at_rest(const Equilibrium& r, const std::string& advice) {
   return Error(ExitCode::failed, "the body does not come to rest: " + r.why, advice);
 }
@@ -70,8 +62,10 @@ StageInfo FemStage::info() {
           .version = 1,
           .synopsis = "how a soft body deforms under a load, by finite elements",
           .description =
-              "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse Cholesky. Linear elasticity, Saint "
-              "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 2e-7 where that "
+              "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse Cholesky. Linear "
+              "elasticity, Saint "
+              "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 2e-7 "
+              "where that "
               "has the same law. The problem can be written as an input file for CalculiX or Abaqus.",
           .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it"},
                      {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"}},
@@ -122,21 +116,23 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
 }
 
 StageInfo CalibrateStage::info() {
-  return {.name = "calibrate",
-          .version = 1,
-          .synopsis = "constants of the fast tissue model, fitted to finite elements",
-          .description =
-              "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
-              "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium (Ceres). The "
-              "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
-              "against quadratic tetrahedra); uncertain factors; the course of the fit.",
-          .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
-                     {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"}},
-          .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
-                      {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
-                         "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
-          .example = "osteo calibrate tissue.vtu problem.json constants.json --fit pull"};
+  return {
+      .name = "calibrate",
+      .version = 1,
+      .synopsis = "constants of the fast tissue model, fitted to finite elements",
+      .description =
+          "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
+          "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
+          "(Ceres). The "
+          "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
+          "against quadratic tetrahedra); uncertain factors; the course of the fit.",
+      .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
+                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"}},
+      .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
+                  {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
+                     "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
+      .example = "osteo calibrate tissue.vtu problem.json constants.json --fit pull"};
 }
 
 std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -144,7 +140,7 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
   const auto points = points_of(mesh);
   const auto tets = tets_of(mesh);
-  TissueModel model = TissueModel::of_voxels(points, tets, of_voxels(problem.materials));
+  TissueModel model = model_of_problem(mesh, problem);
   std::vector<std::size_t> fitted;
   for (std::size_t at = 0; at < p.fit.size();) {
     const std::size_t comma = std::min(p.fit.find(',', at), p.fit.size());
@@ -203,7 +199,8 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
     const Equilibrium before = solver.solve(plain, model.rest(), problem.loads[n].forces_n, {}, context);
     const Equilibrium after = solver.solve(model, model.rest(), problem.loads[n].forces_n, {}, context);
     if (n == fitted.front()) deformed = moved_mesh(mesh, after.points_mm);
-    const CalibrationError b = calibration_error(points, before.points_mm, truth[n]), a = calibration_error(points, after.points_mm, truth[n]);
+    const CalibrationError b = calibration_error(points, before.points_mm, truth[n]),
+                           a = calibration_error(points, after.points_mm, truth[n]);
     j["loads"].push_back({{"name", problem.load_names[n]},
                           {"fitted", used},
                           {"truth_rms_mm", a.truth_rms_mm},
@@ -228,7 +225,8 @@ StageInfo SimulateStage::info() {
           .version = 1,
           .synopsis = "a soft body in time, by the fast distance and volume model",
           .description =
-              "Explicit steps with a limit that is certified; lumped masses, viscous damping. Constants in closed form from the problem's materials, or "
+              "Explicit steps with a limit that is certified; lumped masses, viscous damping. Constants in closed form from the problem's "
+              "materials, or "
               "those that calibrate found. Ends at rest, by the balance of forces.",
           .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
                      {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"},
@@ -243,18 +241,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
   const std::size_t n = load_named(problem, p.load);
-  TissueModel model = TissueModel::of_voxels(points_of(mesh), tets_of(mesh), of_voxels(problem.materials));
-  if (const auto* const constants = std::get_if<Document>(&inputs[2])) {
-    try {
-      const auto j = ordered_json::parse(constants->json);
-      if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
-      model = with_log_factors(model, j.at("grid").get<std::array<int, 3>>(), j.at("log_factors").get<std::vector<double>>());
-    } catch (const nlohmann::json::exception& e) {
-      throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
-    }
-  } else {
-    model.scale({1, 1, 0, 1});
-  }
+  const auto* const constants = std::get_if<Document>(&inputs[2]);
+  const TissueModel model = model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
   DynamicsOptions options;
   options.density_kg_m3 = p.density_kg_m3;
   options.damping_per_s = p.damping_per_s;
@@ -285,8 +273,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
                        {"places_not_finite", dynamics.counts().not_finite},
                        {"points_made_heavier", dynamics.counts().made_heavier}};
   if (dynamics.counts().made_heavier > 0)
-    context.warn(std::to_string(dynamics.counts().made_heavier) + " points were made heavier for steps of " + format_number(p.least_step_ms) +
-                 " ms: motion is slower than it would be");
+    context.warn(std::to_string(dynamics.counts().made_heavier) + " points were made heavier for steps of " +
+                 format_number(p.least_step_ms) + " ms: motion is slower than it would be");
   if (p.until_rest && !at_rest)
     context.warn("not at rest after " + format_number(p.seconds) + " s: residual " + format_number(dynamics.residual()));
   context.report("step_ms", 1000 * dynamics.step_s());

@@ -9,7 +9,9 @@
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkProperty.h>
 #include <vtkRenderer.h>
 #include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
@@ -44,6 +46,7 @@ WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : re
 WorldView::~WorldView() {
   if (looking_.valid()) looking_.wait();
   if (structures_actor_) renderer_->RemoveActor(structures_actor_);
+  if (soft_actor_) renderer_->RemoveActor(soft_actor_);
   for (auto& [id, p] : plates_) {
     renderer_->RemoveActor(p.actor);
     if (p.moving) renderer_->RemoveActor(p.moving);
@@ -95,6 +98,26 @@ void WorldView::update(const World& world, Follower& follower) {
     if (!dust_) dust_ = std::make_unique<DustView>(renderer_, world.bodies().front().body->bone.frame().spacing_mm.x);
     dust_->update(*follower.dust());
   }
+}
+
+void WorldView::update_soft(const SoftBody& soft) {
+  if (!soft_actor_) {
+    soft_data_ = to_vtk(soft.surface());
+    soft_actor_ = make_bone_actor(soft_data_);
+    soft_actor_->GetProperty()->SetColor(0.80, 0.42, 0.40);
+    soft_actor_->GetProperty()->SetSpecular(0.3);
+    soft_actor_->GetMapper()->StaticOff();
+    renderer_->AddActor(soft_actor_);
+  }
+  const auto points = soft.points_mm();
+  const auto of_surface = soft.points_of_surface();
+  vtkPoints* const at = soft_data_->GetPoints();
+  for (std::size_t p = 0; p < of_surface.size(); ++p) {
+    const Vec3 x = points[of_surface[p]];
+    at->SetPoint(static_cast<vtkIdType>(p), x.x, x.y, x.z);
+  }
+  at->Modified();
+  soft_data_->Modified();
 }
 
 void WorldView::highlight(std::uint32_t body) {
@@ -185,13 +208,14 @@ void WorldView::rest(int width, int height) {
   });
 }
 
-Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p) {
+Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p, const SoftBody* soft) {
   OffscreenWindow window(p.width, p.height);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);
   set_up_scene(renderer);
   WorldView view(renderer, structures);
   view.update(world, follower);
+  if (soft != nullptr) view.update_soft(*soft);
   look_at(renderer, p.centre_mm, p.radius_mm, p.eye);
   return window.render();
 }

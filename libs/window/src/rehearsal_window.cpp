@@ -266,7 +266,10 @@ class RehearsalWindow {
     ImGui::Render();
 
     Rehearsal& rehearsal = actions_.rehearsal();
-    rehearsal.look([&](const World& world, Follower& follower) { world_view_->update(world, follower); });
+    rehearsal.look([&](const World& world, Follower& follower) {
+      world_view_->update(world, follower);
+      if (rehearsal.soft() != nullptr) world_view_->update_soft(*rehearsal.soft());
+    });
     world_view_->highlight(tools_->piece());
     const TickRecord tick = rehearsal.latest();
     place_tool(tick);

@@ -31,6 +31,7 @@ enum class ActionKind : std::uint32_t {
   suction,   ///< a sucker at a place; rate 0: away
   irrigate,  ///< water at a place; share 0: away
   undo,      ///< take back the last saw, split, move, attach, detach or open
+  yield,     ///< what soft tissue pushes with near the tool, until the next of these
 };
 
 /// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
@@ -55,6 +56,8 @@ struct SceneAction {
   static SceneAction open(std::uint32_t fixture, double opening_mm);
   static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
   static SceneAction irrigate(Vec3 at_mm, double radius_mm, double share_per_s);
+  /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
+  static SceneAction yield(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   [[nodiscard]] SawCut saw_cut() const;
   [[nodiscard]] RigidTransform transform() const;
 };

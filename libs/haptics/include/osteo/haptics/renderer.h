@@ -30,6 +30,9 @@ class HapticRenderer {
 
   /// From the next step on. The scene belongs to the caller and must live until another is shown. No allocation.
   void show(HapticScene* scene) noexcept { scene_ = scene; }
+  /// What soft tissue pushes with from now on (ActionKind::yield): a plane near the tool, made by whoever moves the tissue, felt at full
+  /// rate.
+  void feel(const SceneAction& yield) noexcept;
   /// Nothing is removed while held.
   void hold(bool on) noexcept { held_ = on; }
 
@@ -64,6 +67,10 @@ class HapticRenderer {
   HapticScene own_;  // where it was made for one bone
   HapticScene* scene_ = nullptr;
   bool held_ = false;
+  struct {
+    Vec3 at_mm, normal;
+    double force_n = 0, stiffness_n_per_mm = 0;
+  } soft_;
   std::array<Touch, kMostTouched> touched_;
   std::size_t touched_count_ = 0;
   const TouchedBone* loaded_ = nullptr;  // that the tool presses on most

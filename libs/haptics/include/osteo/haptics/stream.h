@@ -38,6 +38,7 @@ enum TickFlag : std::uint32_t {
   kStructureInjured = 1024,  ///< and it turns
   kHeld = 2048,              ///< nothing was removed, since the scene is being changed
   kPlateInHand = 4096,       ///< the hand holds a plate, not the drill
+  kSoftContact = 8192,       ///< soft tissue pushes the tool
 };
 
 /// One tick, as it is written to session files (little endian).

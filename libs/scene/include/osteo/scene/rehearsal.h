@@ -12,6 +12,7 @@
 #include "osteo/rt/loop.h"
 #include "osteo/scene/follower.h"
 #include "osteo/scene/operation.h"
+#include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
 
 namespace osteo {
@@ -23,6 +24,7 @@ struct RehearsalOptions {
   std::filesystem::path session_file;  ///< empty: not recorded
   FollowerParts follow;                ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
+  std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
 };
 
 struct RehearsalSummary {
@@ -74,6 +76,8 @@ class Rehearsal {
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
   [[nodiscard]] double stiffness_n_per_mm() const { return operation_.renderer().stiffness_n_per_mm(); }
   [[nodiscard]] Device& device() { return *device_; }
+  /// Null where the scene has none; its points under look() only.
+  [[nodiscard]] const SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
   void look(const std::function<void(const World&, Follower&)>& f);
 
@@ -81,6 +85,7 @@ class Rehearsal {
   void follow();
   std::size_t drain();
   void perform(const SceneAction& action, bool live);
+  std::optional<SceneAction> move_soft();
   RehearsalSummary finish();
 
   std::unique_ptr<Device> device_;
@@ -99,6 +104,7 @@ class Rehearsal {
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
+  std::uint64_t soft_tick_ = 0;  // of the next update of soft tissue
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

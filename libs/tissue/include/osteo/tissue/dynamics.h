@@ -12,9 +12,9 @@ namespace osteo {
 
 struct DynamicsOptions {
   double density_kg_m3 = 1000;
-  double damping_per_s = 0;   ///< viscous: forces of -damping * mass * velocity; 0: energy is kept
-  double step_share = 0.9;    ///< of the certified limit
-  double least_step_s = 0;    ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
+  double damping_per_s = 0;  ///< viscous: forces of -damping * mass * velocity; 0: energy is kept
+  double step_share = 0.9;   ///< of the certified limit
+  double least_step_s = 0;   ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
 };
 
 /// A ball that pushes points out of itself.
@@ -24,9 +24,9 @@ struct BallTool {
   double stiffness_n_per_mm = 1;  ///< of each point it meets
 };
 
-/// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the highest
-/// frequency at rest, with a quarter more for stretch.
-/// Lumped masses. A place that is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to rounding. The same bits for any instruction set.
+/// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the
+/// highest frequency at rest, with a quarter more for stretch. Lumped masses. A place that is no number is not taken, and counted. `Real`
+/// float: the quick one; double: the exact one, momentum kept to rounding. The same bits for any instruction set.
 template <class Real>
 class TissueDynamics {
  public:
@@ -44,6 +44,8 @@ class TissueDynamics {
   Vec3 step(int steps = 1);
 
   [[nodiscard]] double step_s() const;
+  /// Points that the tool met in the last step.
+  [[nodiscard]] int met_by_tool() const;
   [[nodiscard]] std::vector<Vec3> positions_mm() const;
   [[nodiscard]] std::size_t point_count() const;
   /// Largest unbalanced force on a free point over the largest load (or 1 N): at rest when small and kinetic energy is too.
@@ -53,8 +55,8 @@ class TissueDynamics {
   [[nodiscard]] Vec3 momentum_n_s() const;
 
   struct Counts {
-    std::uint64_t not_finite = 0;       ///< points put back where they were because their place was no number
-    std::uint64_t made_heavier = 0;     ///< points, for least_step_s
+    std::uint64_t not_finite = 0;    ///< points put back where they were because their place was no number
+    std::uint64_t made_heavier = 0;  ///< points, for least_step_s
   };
   [[nodiscard]] const Counts& counts() const;
 

@@ -1,11 +1,13 @@
 // What is asked of a piece of tissue: materials, what holds it, loads. A JSON file.
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "osteo/data/tet_mesh.h"
 #include "osteo/tissue/fem.h"
+#include "osteo/tissue/tissue_model.h"
 
 namespace osteo {
 
@@ -22,6 +24,10 @@ struct TissueProblem {
   std::vector<TissueLoad> loads;  ///< each with `fixed`
 };
 /// Errors: usage with the place in the text; for places that no point lies in; for a load on fixed points alone.
-[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh);
+/// Without `needs_loads` there may be none.
+[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads = true);
+/// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
+[[nodiscard]] TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem,
+                                           const std::optional<std::string>& constants_json = std::nullopt);
 
 }  // namespace osteo

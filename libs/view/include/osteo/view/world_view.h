@@ -8,6 +8,7 @@
 
 #include "osteo/data/data.h"
 #include "osteo/scene/follower.h"
+#include "osteo/scene/soft_body.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/dust_view.h"
 
@@ -23,6 +24,8 @@ class WorldView {
 
   /// Shows the scene as it is; after the first time only what changed is made again.
   void update(const World& world, Follower& follower);
+  /// Soft tissue as it is now; under the lock that keeps it still.
+  void update_soft(const SoftBody& soft);
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
   [[nodiscard]] std::size_t triangles() const;
@@ -44,7 +47,8 @@ class WorldView {
   };
   vtkRenderer* renderer_;
   const StructureMap* structures_;
-  vtkSmartPointer<vtkActor> structures_actor_;
+  vtkSmartPointer<vtkActor> structures_actor_, soft_actor_;
+  vtkSmartPointer<vtkPolyData> soft_data_;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
   std::map<std::uint32_t, Plate> plates_;
   std::unique_ptr<DustView> dust_;
@@ -62,6 +66,7 @@ struct WorldPicture {
   int width = 900, height = 700;
 };
 /// Works without a display. Error(failed) when there is no OpenGL.
-[[nodiscard]] Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& picture);
+[[nodiscard]] Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& picture,
+                                 const SoftBody* soft = nullptr);
 
 }  // namespace osteo
