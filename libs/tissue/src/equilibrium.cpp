@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "osteo/base/error.h"
+#include "osteo/base/param.h"
 
 namespace osteo {
 namespace {
@@ -23,8 +24,8 @@ std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
 struct EquilibriumSolver::Impl {
   std::vector<std::uint32_t> number;  // of a point among those that move
   std::size_t moving = 0;
-  std::vector<std::uint32_t> first;    // of each element in slots
-  std::vector<std::int64_t> slots;     // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
+  std::vector<std::uint32_t> first;  // of each element in slots
+  std::vector<std::int64_t> slots;   // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
   Matrix h;
   Eigen::SimplicialLLT<Matrix, Eigen::Lower> factor;
   bool analysed = false;
@@ -116,7 +117,8 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
   if (rest.size() != points) throw Error(ExitCode::usage, "the rest shape has another number of points than the model");
   std::vector<bool> is_fixed(points), used(points);
   for (const std::uint32_t p : fixed) {
-    if (p >= points) throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
+    if (p >= points)
+      throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
     is_fixed[p] = true;
   }
   // Parts that hang together: each must be held.
@@ -125,7 +127,8 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
   for (std::size_t e = 0; e < energy.element_count(); ++e) {
     const auto nodes = energy.nodes(e);
     for (const std::uint32_t p : nodes) {
-      if (p >= points) throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
+      if (p >= points)
+        throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
       used[p] = true;
       const std::uint32_t a = root(parent, nodes[0]), b = root(parent, p);
       if (a != b) parent[std::max(a, b)] = std::min(a, b);
@@ -144,9 +147,10 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
       enough = length(cross(a, b)) > 1e-9 * (dot(a, a) + dot(b, b));
     }
     if (!enough) {
-      throw Error(ExitCode::usage, "the part of the body with point " + std::to_string(p) + " can move freely: it has " +
-                                       std::to_string(h.size()) + " fixed points",
-                  "fix at least three of its points that do not lie in a line, or leave the part out");
+      throw Error(
+          ExitCode::usage,
+          "the part of the body with point " + std::to_string(p) + " can move freely: it has " + std::to_string(h.size()) + " fixed points",
+          "fix at least three of its points that do not lie in a line, or leave the part out");
     }
   }
   impl_->number.assign(points, kFixed);
@@ -177,7 +181,8 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
     if (free(p)) load_size += dot(load[p], load[p]);
   }
   load_size = std::sqrt(load_size);
-  double share = 0;
+  double share = 0, extent = 0;
+  for (const Vec3& p : start) extent = std::max({extent, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   const auto potential = [&](std::span<const Vec3> at) {
     double work = 0;
     for (std::uint32_t p = 0; p < at.size(); ++p) work += dot(load[p], at[p] - start[p]) * share;
@@ -237,8 +242,13 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
         done = true;
         break;
       }
-      ++result.iterations;
       step = m.factor.solve(right);
+      // What is left to move is lost in the rounding of the places themselves: at rest, whatever the forces' rounding adds up to.
+      if (step.size() == 0 || step.lpNorm<Eigen::Infinity>() <= 1e-13 * extent) {
+        done = true;
+        break;
+      }
+      ++result.iterations;
       const double slope = -right.dot(step);  // of the potential along the step
       double length = 1;
       bool moved = false;
@@ -259,14 +269,31 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
           moved = true;
           break;
         }
+        // Near the end energies differ by less than they are rounded: then a full step counts that halves the forces.
+        if (halve == 0 && std::isfinite(next) && result.residual < 1e-3) {
+          total_gradient(energy, trial, gradient);
+          double after = 0;
+          for (std::uint32_t p = 0; p < x.size(); ++p) {
+            const Vec3 r = load[p] * share - gradient[p];
+            after += free(p) ? dot(r, r) : 0;
+          }
+          if (std::sqrt(after) < 0.5 * residual) {
+            x.swap(trial);
+            value = next;
+            moved = true;
+            break;
+          }
+        }
       }
       if (!moved) {
-        result.why = "no step lowers the energy any more, at a residual of " + std::to_string(result.residual);
+        result.why = "no step lowers the energy any more, at a residual of " + format_number(result.residual);
         break;
       }
     }
     if (!done) {
-      if (result.why.empty()) result.why = "not at rest after " + std::to_string(options.iterations) + " iterations";
+      if (result.why.empty())
+        result.why =
+            "not at rest after " + std::to_string(options.iterations) + " iterations, at a residual of " + format_number(result.residual);
       result.energy_mj = total_energy(energy, x);
       return result;
     }

@@ -16,9 +16,10 @@ struct TissueLoad {
 };
 
 struct EquilibriumOptions {
-  double tolerance = 1e-10;  ///< of the residual force, relative to the load (without load: to the first); rounding may end it sooner, below 1e-7
+  double tolerance = 1e-10;  ///< of the residual force, relative to the load (without load: to the first); rounding may end it sooner:
+                             ///< below 1e-7, or when the next step would be a 10^13th of the body
   int iterations = 100;
-  int load_steps = 1;        ///< the load grows in so many equal steps
+  int load_steps = 1;  ///< the load grows in so many equal steps
 };
 
 struct Equilibrium {
@@ -26,8 +27,8 @@ struct Equilibrium {
   bool converged = false;
   std::string why;  ///< not converged: what happened
   int iterations = 0, factorisations = 0;
-  double residual = 0;       ///< relative, as for tolerance
-  double energy_mj = 0;      ///< internal
+  double residual = 0;        ///< relative, as for tolerance
+  double energy_mj = 0;       ///< internal
   std::uint64_t shifted = 0;  ///< factorisations that needed a shift: the energy was not convex there
 };
 
