@@ -4,20 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "osteo/grid/brick_linear.h"
+
 namespace osteo {
 namespace {
-
-// Linear between voxel centres.
-double density_at(const BrickGrid& bone, Vec3 x) {
-  const int i = static_cast<int>(std::floor(x.x)), j = static_cast<int>(std::floor(x.y)), k = static_cast<int>(std::floor(x.z));
-  const double u[3] = {x.x - i, x.y - j, x.z - k};
-  double sum = 0;
-  for (int c = 0; c < 8; ++c) {
-    const double w = ((c & 1) != 0 ? u[0] : 1 - u[0]) * ((c & 2) != 0 ? u[1] : 1 - u[1]) * ((c & 4) != 0 ? u[2] : 1 - u[2]);
-    sum += w * static_cast<double>(bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)));
-  }
-  return sum;
-}
 
 // From inside the plate's thickness outwards: the first place along `down` where bone begins.
 double gap_to(const PlacedBody& placed, Vec3 at, Vec3 down, double above_mm, double reach_mm) {
@@ -26,11 +16,11 @@ double gap_to(const PlacedBody& placed, Vec3 at, Vec3 down, double above_mm, dou
   const Frame& f = bone.frame();
   const double h = f.spacing_mm.x, step = 0.5 * h;
   const Vec3 start = f.index_from_world(own(at)), way = transposed(f.direction) * (own.rotation * down) / h;
-  double before = density_at(bone, start - way * above_mm);
+  double before = static_cast<double>(linear_at(bone, start - way * above_mm));
   // A plate that lies in bone: to where that begins above it, were it all around no gap can be told.
   if (before >= 0.5) return -above_mm;
   for (double s = -above_mm + step; s <= reach_mm + step; s += step) {
-    const double now = density_at(bone, start + way * s);
+    const double now = static_cast<double>(linear_at(bone, start + way * s));
     if (now >= 0.5) return s - step * (now - 0.5) / (now - before);
     before = now;
   }

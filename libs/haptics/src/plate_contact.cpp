@@ -2,31 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/grid/brick_linear.h"
 #include "osteo/haptics/haptic_scene.h"
 
 namespace osteo {
-namespace {
-
-// Density between voxel centres, linear in each direction.
-float linear(const BrickGrid& bone, Vec3 x) noexcept {
-  const double fi = std::floor(x.x), fj = std::floor(x.y), fk = std::floor(x.z);
-  const int i = static_cast<int>(fi), j = static_cast<int>(fj), k = static_cast<int>(fk);
-  const auto u = static_cast<float>(x.x - fi), v = static_cast<float>(x.y - fj), w = static_cast<float>(x.z - fk);
-  float d[8];
-  if ((i & 7) != 7 && (j & 7) != 7 && (k & 7) != 7) {
-    const VoxelKey first = bone.find(i, j, k);
-    if (first == BrickGrid::kNone) return 0;
-    const float* const p = bone.values_of_brick(first / BrickGrid::kVoxels) + first % BrickGrid::kVoxels;
-    for (int c = 0; c < 8; ++c) d[c] = p[(c & 1) + (c >> 1 & 1) * 8 + (c >> 2) * 64];
-  } else {
-    for (int c = 0; c < 8; ++c) d[c] = bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-  }
-  const auto mix = [](float a, float b, float t) { return a + (b - a) * t; };
-  return mix(mix(mix(d[0], d[1], u), mix(d[2], d[3], u), v), mix(mix(d[4], d[5], u), mix(d[6], d[7], u), v), w);
-}
-
-}  // namespace
-
 ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& world_from_plate, std::span<const HapticScene::Item> items,
                             const ContactParams& params) noexcept {
   constexpr double kReachMm = 4;    // farther than that inside bone a sample knows no way out
@@ -44,17 +23,17 @@ ContactResult plate_contact(const PlateInHand& plate, const RigidTransform& worl
     const Mat3 to_index = transposed(frame.direction);
     for (const PlateSample& s : plate.samples) {
       Vec3 x = frame.index_from_world(own(s.at_mm));
-      float before = linear(bone, x);
+      float before = linear_at(bone, x);
       if (before < 0.5F) continue;
       const Vec3 back = to_index * (own.rotation * s.outwards) * -step;
       double way = 0;
       bool out = false;
       for (way = step; way * h <= kReachMm; way += step) {
         x += back;
-        const float now = linear(bone, x);
+        const float now = linear_at(bone, x);
         if (now < 0.5F) {
           // Between here and half a step back, or in the half before.
-          const float middle = linear(bone, x - back * 0.5);
+          const float middle = linear_at(bone, x - back * 0.5);
           const bool last_half = middle >= 0.5F;
           const float above = last_half ? middle : before, below = last_half ? now : middle;
           way -= 0.5 * step * (static_cast<double>((0.5F - below) / (above - below)) + (last_half ? 0 : 1));
