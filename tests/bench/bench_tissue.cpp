@@ -88,7 +88,8 @@ Search cma_es(const Objective& f, const Eigen::VectorXd& start, double sigma, in
   w /= w.sum();
   const double mueff = 1 / w.squaredNorm(), cc = (4 + mueff / n) / (n + 4 + 2 * mueff / n), cs = (mueff + 2) / (n + mueff + 5),
                c1 = 2 / ((n + 1.3) * (n + 1.3) + mueff), cmu = std::min(1 - c1, 2 * (mueff - 2 + 1 / mueff) / ((n + 2) * (n + 2) + mueff)),
-               damps = 1 + 2 * std::max(0.0, std::sqrt((mueff - 1) / (n + 1)) - 1) + cs, chi = std::sqrt(n) * (1 - 1.0 / (4 * n) + 1.0 / (21 * n * n));
+               damps = 1 + 2 * std::max(0.0, std::sqrt((mueff - 1) / (n + 1)) - 1) + cs,
+               chi = std::sqrt(n) * (1 - 1.0 / (4 * n) + 1.0 / (21 * n * n));
   Eigen::VectorXd mean = start, ps = Eigen::VectorXd::Zero(n), pc = ps;
   Eigen::MatrixXd c = Eigen::MatrixXd::Identity(n, n);
   std::mt19937 random(1);
@@ -116,7 +117,8 @@ Search cma_es(const Objective& f, const Eigen::VectorXd& start, double sigma, in
     const bool h = ps.norm() / std::sqrt(1 - std::pow(1 - cs, 2.0 * (generation + 1))) < (1.4 + 2.0 / (n + 1)) * chi;
     pc = (1 - cc) * pc + (h ? std::sqrt(cc * (2 - cc) * mueff) : 0) * y;
     c = (1 - c1 - cmu) * c + c1 * (pc * pc.transpose() + (h ? 0 : cc * (2 - cc)) * c);
-    for (int i = 0; i < mu; ++i) c += cmu * w[i] * tried[static_cast<std::size_t>(i)].second * tried[static_cast<std::size_t>(i)].second.transpose();
+    for (int i = 0; i < mu; ++i)
+      c += cmu * w[i] * tried[static_cast<std::size_t>(i)].second * tried[static_cast<std::size_t>(i)].second.transpose();
     sigma *= std::exp(cs / damps * (ps.norm() / chi - 1));
   }
   s.seconds = now_s() - begin;
@@ -210,8 +212,8 @@ void gear_calibration(const Context& context) {
       TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
       const double a = nrms_of(model, body, load, t4.x), b = nrms_of(model, body, load, t10.x);
       const CalibrationError fe = calibration_error(body.b.points, t4.x, t10.x);
-      std::printf("| %s | %.1f%s | %.2f | %.3f | %.3f | %.3f |\n", name.c_str(), t10.seconds, t10.converged ? "" : " (not at rest)", fe.truth_rms_mm,
-                  fe.nrms, a, b);
+      std::printf("| %s | %.1f%s | %.2f | %.3f | %.3f | %.3f |\n", name.c_str(), t10.seconds, t10.converged ? "" : " (not at rest)",
+                  fe.truth_rms_mm, fe.nrms, a, b);
       mean_t4 += a / 4;
       mean_t10 += b / 4;
       cases.push_back({load, t10.x});
@@ -222,12 +224,13 @@ void gear_calibration(const Context& context) {
     // Four factors on load A.
     TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
     const Calibration c = calibrate(model, {cases.data(), 1}, {}, context);
-    std::printf("Four factors fitted to load A: %d equilibrium solves, %.2f s; factors %.3f %.3f %.4f %.3f (axis, diagonal, face, volume), "
-                "uncertain by %.2f %.2f %.2f %.2f (log, for 1 %%); NRMS on A %.3f (closed form %.3f), on B %.3f, C %.3f, D %.3f.\n\n",
-                c.solves, c.seconds, std::exp(c.log_factors[0]), std::exp(c.log_factors[1]), std::exp(c.log_factors[2]), std::exp(c.log_factors[3]),
-                c.uncertainty[1], c.uncertainty[2], c.uncertainty[3], c.uncertainty[4], c.after[0].nrms, c.before[0].nrms,
-                nrms_of(model, body, loads[1].second, cases[1].truth_mm), nrms_of(model, body, loads[2].second, cases[2].truth_mm),
-                nrms_of(model, body, loads[3].second, cases[3].truth_mm));
+    std::printf(
+        "Four factors fitted to load A: %d equilibrium solves, %.2f s; factors %.3f %.3f %.4f %.3f (axis, diagonal, face, volume), "
+        "uncertain by %.2f %.2f %.2f %.2f (log, for 1 %%); NRMS on A %.3f (closed form %.3f), on B %.3f, C %.3f, D %.3f.\n\n",
+        c.solves, c.seconds, std::exp(c.log_factors[0]), std::exp(c.log_factors[1]), std::exp(c.log_factors[2]), std::exp(c.log_factors[3]),
+        c.uncertainty[1], c.uncertainty[2], c.uncertainty[3], c.uncertainty[4], c.after[0].nrms, c.before[0].nrms,
+        nrms_of(model, body, loads[1].second, cases[1].truth_mm), nrms_of(model, body, loads[2].second, cases[2].truth_mm),
+        nrms_of(model, body, loads[3].second, cases[3].truth_mm));
     std::mt19937 random(7);
     std::uniform_real_distribution<double> u(-1, 1);
     double mean = 0, worst = 0, t4_mean = 0;
@@ -264,15 +267,61 @@ void gear_calibration(const Context& context) {
     start << 0, 0, -2, 0;
     const double goal = c.after[0].nrms;
     const Search cma = cma_es(f, start, 0.5, 800, goal), annealed = annealing(f, start, 2, 1500, goal);
-    std::printf("| way | solves | solves to within 1 %% of the fit | NRMS on A | s |\n|---|---|---|---|---|\n| Levenberg-Marquardt, implicit Jacobian | %d | | %.4f | %.2f |\n", c.solves, goal, c.seconds);
+    std::printf(
+        "| way | solves | solves to within 1 %% of the fit | NRMS on A | s |\n|---|---|---|---|---|\n| Levenberg-Marquardt, implicit "
+        "Jacobian | %d | | %.4f | %.2f |\n",
+        c.solves, goal, c.seconds);
     for (const auto& [name, s] : {std::pair{"CMA-ES", cma}, {"annealing after 100 random starts", annealed}})
-      std::printf("| %s | %d | %s | %.4f | %.1f |\n", name, s.solves, s.solves_to_goal > 0 ? std::to_string(s.solves_to_goal).c_str() : "never", s.best, s.seconds);
+      std::printf("| %s | %d | %s | %.4f | %.1f |\n", name, s.solves,
+                  s.solves_to_goal > 0 ? std::to_string(s.solves_to_goal).c_str() : "never", s.best, s.seconds);
     std::printf("\n");
   }
 }
 
+// A beam 10 x 1 x 1 bent at its end: energy (half the load's work) against the finest quadratic answer.
+void convergence() {
+  std::printf(
+      "### Finite elements: error of the energy of a bent beam against t10 at 1/4, and its order\n\n| h | t4 | order | t10 | order | "
+      "seconds t4, t10 |\n|---|---|---|---|---|---|\n");
+  double energy[3][2], seconds[3][2];
+  const auto solve = [](int n, TetOrder order) {
+    Body body{test::block(10 * n, n, n, 1.0 / n), {}};
+    TissueLoad load;
+    for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
+      if (body.b.points[p].x < 1e-9) body.fixed.push_back(p);
+    }
+    // Shear over the end face, shared as a uniform traction is among bilinear squares.
+    for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
+      const Vec3 q = body.b.points[p];
+      if (q.x < 10 - 1e-9) continue;
+      const double share = (q.y < 1e-9 || q.y > 1 - 1e-9 ? 0.5 : 1) * (q.z < 1e-9 || q.z > 1 - 1e-9 ? 0.5 : 1) / (n * n);
+      load.forces_n.push_back({p, {0, 0, 0.01 * share}});
+    }
+    const double begin = now_s();
+    const FemBody fem(body.b.points, body.b.tets, {{100, 0.3}}, ElasticLaw::linear, order);
+    EquilibriumSolver solver(fem, fem.rest(), fem.with_middles(body.fixed));
+    const Equilibrium r = solver.solve(fem, fem.rest(), load.forces_n);
+    return std::pair{r.energy_mj, now_s() - begin};
+  };
+  constexpr int kFine[3] = {1, 2, 4};
+  for (int k = 0; k < 3; ++k)
+    for (int o = 0; o < 2; ++o) std::tie(energy[k][o], seconds[k][o]) = solve(kFine[k], o == 0 ? TetOrder::t4 : TetOrder::t10);
+  // What t10 tends to, from its last two (Aitken over the three).
+  const double a = energy[0][1], b = energy[1][1], c = energy[2][1], exact = c - (c - b) * (c - b) / (c - 2 * b + a);
+  for (int k = 0; k < 3; ++k) {
+    const double e4 = std::abs(energy[k][0] / exact - 1), e10 = std::abs(energy[k][1] / exact - 1);
+    const double o4 = k > 0 ? std::log2(std::abs(energy[k - 1][0] / exact - 1) / e4) : 0,
+                 o10 = k > 0 ? std::log2(std::abs(energy[k - 1][1] / exact - 1) / e10) : 0;
+    std::printf("| 1/%d | %.3f | %s | %.4f | %s | %.2f, %.2f |\n", kFine[k], e4, k > 0 ? std::to_string(o4).substr(0, 4).c_str() : "", e10,
+                k > 0 ? std::to_string(o10).substr(0, 4).c_str() : "", seconds[k][0], seconds[k][1]);
+  }
+  std::printf("\n");
+}
+
 void incompressible() {
-  std::printf("### Poisson's ratio near a half: cube of 8 x 8 x 8 voxels, base held, load on top\n\n| nu | T4 off T10 | closed form off T10 | ratio |\n|---|---|---|---|\n");
+  std::printf(
+      "### Poisson's ratio near a half: cube of 8 x 8 x 8 voxels, base held, load on top\n\n| nu | T4 off T10 | closed form off T10 | "
+      "ratio |\n|---|---|---|---|\n");
   Body body{test::block(8, 8, 8, 25), {}};
   for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
     if (body.b.points[p].z < 1e-9) body.fixed.push_back(p);
@@ -282,7 +331,8 @@ void incompressible() {
     TissueLoad load;
     load.fixed = body.fixed;
     patch(body, {100, 100, 200}, 60, {5, 0, -10}, load);
-    const Truth t10 = solve_fem(body, {m}, ElasticLaw::linear, TetOrder::t10, load), t4 = solve_fem(body, {m}, ElasticLaw::linear, TetOrder::t4, load);
+    const Truth t10 = solve_fem(body, {m}, ElasticLaw::linear, TetOrder::t10, load),
+                t4 = solve_fem(body, {m}, ElasticLaw::linear, TetOrder::t4, load);
     TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&m, 1));
     const double fe = calibration_error(body.b.points, t4.x, t10.x).nrms, own = nrms_of(model, body, load, t10.x);
     std::printf("| %g | %.3f | %.3f | %.2f |\n", nu, fe, own, own / fe);
@@ -342,10 +392,14 @@ void two_materials(const Context& context) {
   patch(body, {40, 40, 200}, 60, {-3, 4, -3}, other);
   const Truth unseen = solve_fem(body, materials, ElasticLaw::neo_hooke, TetOrder::t10, other);
   std::printf("| | parameters | solves | s | NRMS | NRMS on another load | contrast learnt (true 20) |\n|---|---|---|---|---|---|---|\n");
-  std::printf("| homogeneous | %d | %d | %.1f | %.3f | %.3f | |\n", h.parameters, h.solves, h.seconds, h.after[0].nrms, nrms_of(homogeneous, body, other, unseen.x));
-  std::printf("| map of stiffness | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", m.parameters, m.solves, m.seconds, m.after[0].nrms, nrms_of(mapped, body, other, unseen.x), contrast(m));
-  std::printf("| map of stiffness, three loads | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", t.parameters, t.solves, t.seconds, t.after[0].nrms, nrms_of(thrice, body, other, unseen.x), contrast(t));
-  std::printf("| a map for each class | %d | %d | %.1f | %.3f | %.3f | %.1f |\n\n", g.parameters, g.solves, g.seconds, g.after[0].nrms, nrms_of(model, body, other, unseen.x), contrast(g));
+  std::printf("| homogeneous | %d | %d | %.1f | %.3f | %.3f | |\n", h.parameters, h.solves, h.seconds, h.after[0].nrms,
+              nrms_of(homogeneous, body, other, unseen.x));
+  std::printf("| map of stiffness | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", m.parameters, m.solves, m.seconds, m.after[0].nrms,
+              nrms_of(mapped, body, other, unseen.x), contrast(m));
+  std::printf("| map of stiffness, three loads | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", t.parameters, t.solves, t.seconds,
+              t.after[0].nrms, nrms_of(thrice, body, other, unseen.x), contrast(t));
+  std::printf("| a map for each class | %d | %d | %.1f | %.3f | %.3f | %.1f |\n\n", g.parameters, g.solves, g.seconds, g.after[0].nrms,
+              nrms_of(model, body, other, unseen.x), contrast(g));
 }
 
 // One Gauss-Seidel pass over edges and tetrahedra (M. Macklin et al., XPBD, 2016), in single precision, as its open implementations do it.
@@ -361,7 +415,9 @@ class Xpbd {
     }
     for (const double m : mass) w_.push_back(static_cast<float>(1 / m));
     for (const auto& c : model.constraints()) {
-      if (c.nodes == 2) edges_.push_back({{c.node[0], c.node[1]}, static_cast<float>(c.rest), static_cast<float>(c.rest * c.rest / (c.stiffness * dt * dt))});
+      if (c.nodes == 2)
+        edges_.push_back(
+            {{c.node[0], c.node[1]}, static_cast<float>(c.rest), static_cast<float>(c.rest * c.rest / (c.stiffness * dt * dt))});
     }
   }
   void iterate() {
@@ -403,8 +459,11 @@ class Xpbd {
 };
 
 void throughput() {
-  std::printf("### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: tets/ms | steps/s | double | thesis' constraints (edges, faces, "
-              "tetrahedra) | one pass of XPBD |\n|---|---|---|---|---|---|---|\n", tissue_simd_name());
+  std::printf(
+      "### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: tets/ms | steps/s | "
+      "double | thesis' constraints (edges, faces, "
+      "tetrahedra) | one pass of XPBD |\n|---|---|---|---|---|---|---|\n",
+      tissue_simd_name());
   for (const int n : {14, 22, 40}) {
     const auto b = test::block(n, n, n, 5);
     const Material m{0.1, 0.45};
@@ -425,8 +484,9 @@ void throughput() {
       return static_cast<double>(b.tets.size()) / best / 1000;
     };
     const double own = rate([&] { quick.step(); });
-    std::printf("| %zu | %.3f | %.0f | %.0f | %.0f | %.0f | %.0f |\n", b.tets.size(), 1000 * quick.step_s(), own, own * 1000 / static_cast<double>(b.tets.size()),
-                rate([&] { exact.step(); }), rate([&] { thesis.step(); }), rate([&] { xpbd.iterate(); }));
+    std::printf("| %zu | %.3f | %.0f | %.0f | %.0f | %.0f | %.0f |\n", b.tets.size(), 1000 * quick.step_s(), own,
+                own * 1000 / static_cast<double>(b.tets.size()), rate([&] { exact.step(); }), rate([&] { thesis.step(); }),
+                rate([&] { xpbd.iterate(); }));
   }
   std::printf("\n");
 }
@@ -434,6 +494,7 @@ void throughput() {
 }  // namespace
 
 void bench_tissue(const Context& context) {
+  convergence();
   throughput();
   two_materials(context);
   incompressible();

@@ -3,15 +3,12 @@
 #include <cmath>
 
 #include "dynamics_kernel.h"
+#include "voxel_split.h"
 
 namespace osteo::tissue::OSTEO_ISA {
 namespace {
 
 constexpr std::size_t kLanes = 16;
-
-// The five tetrahedra of a voxel, either way; as in tissue_model.cpp.
-constexpr int kSplit[2][5][4] = {{{0, 3, 6, 5}, {1, 0, 5, 3}, {2, 3, 6, 0}, {4, 5, 0, 6}, {7, 6, 3, 5}},
-                                 {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}}};
 
 // Corners of sixteen elements side by side; lanes beyond the end repeat the last element and are not written.
 template <class Real, int N>
@@ -86,7 +83,8 @@ void add_volumes(Corners<Real, N>& c, const int (&tets)[T][4], Real* volume) {
 }
 
 template <class Real, int N, int T>
-void volumes(const Arrays<Real>& a, const int (&tets)[T][4], std::size_t count, const std::uint32_t* node, const Real* k, const Real* inverse) {
+void volumes(const Arrays<Real>& a, const int (&tets)[T][4], std::size_t count, const std::uint32_t* node, const Real* k,
+             const Real* inverse) {
   Corners<Real, N> c;
   alignas(64) Real push[kLanes];
   for (std::size_t e = 0; e < count; e += kLanes) {
@@ -171,7 +169,7 @@ template <class Real>
 void forces(const Arrays<Real>& a) {
   edges(a);
   faces(a);
-  for (int s = 0; s < 2; ++s) volumes<Real, 8>(a, kSplit[s], a.voxels[s].count, a.voxels[s].node, a.voxels[s].k, a.voxels[s].inverse);
+  for (int s = 0; s < 2; ++s) volumes<Real, 8>(a, kVoxelSplit[s], a.voxels[s].count, a.voxels[s].node, a.voxels[s].k, a.voxels[s].inverse);
   constexpr int kOne[1][4] = {{0, 1, 2, 3}};
   volumes<Real, 4>(a, kOne, a.tets.count, a.tets.node, a.tets.k, a.tets.inverse);
 }

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "osteo/base/error.h"
+#include "voxel_split.h"
 
 namespace osteo {
 namespace {
@@ -27,7 +28,7 @@ void add_outer(double* h, std::size_t n, const Vec3* g, double s) {
 }
 
 // A tetrahedron's volume; its gradients, and where asked the Hessian times `s` added, for nodes `at` of n.
-double tet_volume(const Vec3* x, const std::size_t* at, std::size_t n, Vec3* g, double* hessian, double s) {
+double tet_volume(const Vec3* x, const int* at, std::size_t n, Vec3* g, double* hessian, double s) {
   const Vec3 o = x[at[0]], d1 = x[at[1]] - o, d2 = x[at[2]] - o, d3 = x[at[3]] - o;
   const Vec3 g1 = cross(d2, d3) / 6, g2 = cross(d3, d1) / 6, g3 = cross(d1, d2) / 6;
   if (g != nullptr) {
@@ -58,9 +59,6 @@ double tet_volume(const Vec3* x, const std::size_t* at, std::size_t n, Vec3* g, 
   }
   return dot(d1, cross(d2, d3)) / 6;
 }
-
-// Of eight corners (bit 0: x, bit 1: y, bit 2: z): the five tetrahedra of either split.
-constexpr std::size_t kSplit[2][5][4] = {{{0, 3, 6, 5}, {1, 0, 5, 3}, {2, 3, 6, 0}, {4, 5, 0, 6}, {7, 6, 3, 5}}, {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}}};
 
 }  // namespace
 
@@ -120,13 +118,13 @@ double TissueModel::element(std::size_t e, const Vec3* x, double* gradient, doub
       }
     }
   } else if (n == 4) {
-    constexpr std::size_t kAll[4] = {0, 1, 2, 3};
+    constexpr int kAll[4] = {0, 1, 2, 3};
     q = tet_volume(x, kAll, n, g, nullptr, 0);
     if (hessian != nullptr) tet_volume(x, kAll, n, nullptr, hessian, k * (q / c.rest - 1));
   } else {
-    for (const auto& t : kSplit[c.voxel]) q += tet_volume(x, t, n, g, nullptr, 0);
+    for (const auto& t : tissue::kVoxelSplit[c.voxel]) q += tet_volume(x, t, n, g, nullptr, 0);
     if (hessian != nullptr) {
-      for (const auto& t : kSplit[c.voxel]) tet_volume(x, t, n, nullptr, hessian, k * (q / c.rest - 1));
+      for (const auto& t : tissue::kVoxelSplit[c.voxel]) tet_volume(x, t, n, nullptr, hessian, k * (q / c.rest - 1));
     }
   }
   const double strain = q / c.rest - 1;
@@ -141,12 +139,14 @@ double TissueModel::element(std::size_t e, const Vec3* x, double* gradient, doub
 TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets,
                                    std::span<const Material> materials, bool faces) {
   const auto refuse = [](const std::string& what) {
-    return Error(ExitCode::usage, "this is no mesh of voxels split into five tetrahedra each: " + what, "make it with tetrahedralize --method grid");
+    return Error(ExitCode::usage, "this is no mesh of voxels split into five tetrahedra each: " + what,
+                 "make it with tetrahedralize --method grid");
   };
   if (tets.empty() || tets.size() % 5 != 0) throw refuse("it has " + std::to_string(tets.size()) + " tetrahedra");
   const std::size_t voxels = tets.size() / 5;
   if (materials.size() != 1 && materials.size() != voxels)
-    throw Error(ExitCode::usage, std::to_string(materials.size()) + " materials for " + std::to_string(voxels) + " voxels", "give one for all, or one each");
+    throw Error(ExitCode::usage, std::to_string(materials.size()) + " materials for " + std::to_string(voxels) + " voxels",
+                "give one for all, or one each");
   for (const Material& m : materials) {
     if (!(m.young_mpa > 0) || !(m.poisson >= 0.25) || !(m.poisson < 0.5))
       throw Error(ExitCode::usage, "the closed form needs a modulus above 0 and a Poisson's ratio from 0.25 to below 0.5, not " +
@@ -190,7 +190,7 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
     // Which split: the one whose first tetrahedron (the regular one) is among the five.
     for (std::uint32_t s = 0; s < 2; ++s) {
       std::array<std::uint32_t, 4> regular;
-      for (std::size_t i = 0; i < 4; ++i) regular[i] = volume.node[kSplit[s][0][i]];
+      for (std::size_t i = 0; i < 4; ++i) regular[i] = volume.node[static_cast<std::size_t>(tissue::kVoxelSplit[s][0][i])];
       std::sort(regular.begin(), regular.end());
       for (std::size_t t = 0; t < 5; ++t) {
         auto sorted = tets[5 * v + t];
@@ -201,7 +201,7 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
     volume.rest = 0;
     Vec3 place[8];
     for (std::size_t i = 0; i < 8; ++i) place[i] = points[volume.node[i]];
-    for (const auto& t : kSplit[volume.voxel]) volume.rest += tet_volume(place, t, 8, nullptr, nullptr, 0);
+    for (const auto& t : tissue::kVoxelSplit[volume.voxel]) volume.rest += tet_volume(place, t, 8, nullptr, nullptr, 0);
     if (!(volume.rest > 0.99 * h * h * h)) throw refuse("its voxels are turned inside out");
     volumes.push_back(volume);
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> own;
@@ -247,8 +247,8 @@ TissueModel TissueModel::of_voxels(std::span<const Vec3> points, std::span<const
   return model;
 }
 
-TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, double distance, double area,
-                                 double volume) {
+TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, double distance,
+                                 double area, double volume) {
   TissueModel model;
   model.rest_.assign(points.begin(), points.end());
   model.tets_.assign(tets.begin(), tets.end());
@@ -256,7 +256,8 @@ TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const s
   std::map<std::array<std::uint32_t, 3>, bool> areas;
   for (const auto& tet : tets) {
     for (std::size_t i = 0; i < 4; ++i) {
-      if (tet[i] >= points.size()) throw Error(ExitCode::usage, "a tetrahedron names point " + std::to_string(tet[i]) + ", which is not there");
+      if (tet[i] >= points.size())
+        throw Error(ExitCode::usage, "a tetrahedron names point " + std::to_string(tet[i]) + ", which is not there");
       for (std::size_t j = i + 1; j < 4; ++j) edges[{std::min(tet[i], tet[j]), std::max(tet[i], tet[j])}] = true;
       std::array<std::uint32_t, 3> face{tet[(i + 1) % 4], tet[(i + 2) % 4], tet[(i + 3) % 4]};
       std::sort(face.begin(), face.end());
@@ -299,7 +300,8 @@ TissueModel TissueModel::uniform(std::span<const Vec3> points, std::span<const s
 }
 
 void TissueModel::scale(const std::array<double, kTissueClasses>& factors) {
-  for (std::size_t c = 0; c < constraints_.size(); ++c) constraints_[c].stiffness = base_[c] * factors[static_cast<std::size_t>(constraints_[c].kind)];
+  for (std::size_t c = 0; c < constraints_.size(); ++c)
+    constraints_[c].stiffness = base_[c] * factors[static_cast<std::size_t>(constraints_[c].kind)];
 }
 
 void TissueModel::scale_each(std::span<const double> factors) {

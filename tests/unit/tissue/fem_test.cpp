@@ -11,20 +11,14 @@
 #include <sstream>
 
 #include "block.h"
+#include "derivatives.h"
 #include "osteo/base/error.h"
 
 namespace osteo {
 namespace {
 
 using test::block;
-
-std::vector<Vec3> shaken(const std::vector<Vec3>& x, double by, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> u(-by, by);
-  std::vector<Vec3> y = x;
-  for (Vec3& p : y) p += Vec3{u(random), u(random), u(random)};
-  return y;
-}
+using test::shaken;
 
 std::vector<std::uint32_t> where(const std::vector<Vec3>& points, const std::function<bool(Vec3)>& f) {
   std::vector<std::uint32_t> found;
@@ -39,30 +33,7 @@ TEST(Fem, GradientsAndHessiansAreThoseOfTheEnergy) {
   for (const ElasticLaw law : {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke}) {
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(b.points, b.tets, {{0.3, 0.4}}, law, order);
-      const auto x = shaken(body.rest(), 0.15, 3);
-      for (std::size_t e = 0; e < body.element_count(); ++e) {
-        const auto nodes = body.nodes(e);
-        const std::size_t n = nodes.size();
-        std::vector<Vec3> local(n);
-        for (std::size_t a = 0; a < n; ++a) local[a] = x[nodes[a]];
-        std::vector<double> g(3 * n), h(9 * n * n), up(3 * n), down(3 * n);
-        body.element(e, local.data(), g.data(), h.data());
-        for (std::size_t a = 0; a < n; ++a) {
-          for (std::size_t c = 0; c < 3; ++c) {
-            constexpr double kStep = 1e-5;
-            auto moved = local;
-            moved[a][c] += kStep;
-            const double above = body.element(e, moved.data(), up.data(), nullptr);
-            moved[a][c] -= 2 * kStep;
-            const double below = body.element(e, moved.data(), down.data(), nullptr);
-            EXPECT_NEAR((above - below) / (2 * kStep), g[3 * a + c], 1e-8);
-            for (std::size_t r = 0; r < 3 * n; ++r) {
-              EXPECT_NEAR((up[r] - down[r]) / (2 * kStep), h[r * 3 * n + 3 * a + c], 1e-7);
-              EXPECT_NEAR(h[r * 3 * n + 3 * a + c], h[(3 * a + c) * 3 * n + r], 1e-13);
-            }
-          }
-        }
-      }
+      test::expect_exact_derivatives(body, shaken(body.rest(), 0.15, 3));
     }
   }
 }
@@ -109,7 +80,8 @@ TEST(Fem, UniaxialNeoHookean) {
   const double t = lo, stress = (mu * (stretch * stretch - 1) + lambda * std::log(stretch * t * t)) / stretch;  // first Piola
   for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
     const FemBody body(b.points, b.tets, {m}, ElasticLaw::neo_hooke, order);
-    // Homogeneous: the corner points at the bottom slide in their plane; three pins suffice, so the ends are moved as the answer moves them.
+    // Homogeneous: the corner points at the bottom slide in their plane; three pins suffice, so the ends are moved as the answer moves
+    // them.
     const auto map = [&](Vec3 p) { return Vec3{1 + (p.x - 1) * t, 1 + (p.y - 1) * t, p.z * stretch}; };
     const auto ends = body.with_middles(where(b.points, [](Vec3 p) { return p.z < 0.1 || p.z > 3.9; }));
     std::vector<Vec3> start = body.rest();

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "block.h"
+#include "derivatives.h"
 #include "osteo/base/error.h"
 #include "osteo/tissue/equilibrium.h"
 
@@ -13,14 +14,7 @@ namespace osteo {
 namespace {
 
 using test::block;
-
-std::vector<Vec3> shaken(const std::vector<Vec3>& x, double by, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> u(-by, by);
-  std::vector<Vec3> y = x;
-  for (Vec3& p : y) p += Vec3{u(random), u(random), u(random)};
-  return y;
-}
+using test::shaken;
 
 TEST(TissueModel, GradientsAndHessiansAreThoseOfTheEnergy) {
   const auto b = block(2, 1, 1, 2.0);
@@ -28,27 +22,7 @@ TEST(TissueModel, GradientsAndHessiansAreThoseOfTheEnergy) {
   TissueModel voxels = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1));
   voxels.scale({1, 1, 30, 1});
   for (const TissueModel& model : {voxels, TissueModel::uniform(b.points, b.tets, 0.7, 0.3, 0.9)}) {
-    const auto x = shaken(model.rest(), 0.3, 3);
-    for (std::size_t e = 0; e < model.element_count(); ++e) {
-      const auto nodes = model.nodes(e);
-      const std::size_t n = nodes.size();
-      std::vector<Vec3> local(n);
-      for (std::size_t a = 0; a < n; ++a) local[a] = x[nodes[a]];
-      std::vector<double> g(3 * n), h(9 * n * n), up(3 * n), down(3 * n);
-      model.element(e, local.data(), g.data(), h.data());
-      for (std::size_t a = 0; a < n; ++a) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          constexpr double kStep = 1e-5;
-          auto moved = local;
-          moved[a][c] += kStep;
-          const double above = model.element(e, moved.data(), up.data(), nullptr);
-          moved[a][c] -= 2 * kStep;
-          const double below = model.element(e, moved.data(), down.data(), nullptr);
-          EXPECT_NEAR((above - below) / (2 * kStep), g[3 * a + c], 1e-8) << n;
-          for (std::size_t r = 0; r < 3 * n; ++r) EXPECT_NEAR((up[r] - down[r]) / (2 * kStep), h[r * 3 * n + 3 * a + c], 1e-7) << n;
-        }
-      }
-    }
+    test::expect_exact_derivatives(model, shaken(model.rest(), 0.3, 3));
   }
 }
 
