@@ -247,16 +247,6 @@ Vec3 eye_direction(ViewFrom from) {
   return {1, 0, 0};
 }
 
-Picture draw_surface(const TriMesh& mesh, Vec3 centre_mm, double radius_mm, Vec3 eye, int width, int height) {
-  OffscreenWindow window(width, height);
-  vtkNew<vtkRenderer> renderer;
-  window.window()->AddRenderer(renderer);
-  set_up_scene(renderer);
-  renderer->AddActor(make_bone_actor(to_vtk(mesh)));
-  look_at(renderer, centre_mm, radius_mm, eye);
-  return window.render();
-}
-
 Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
   Picture picture{p.width, p.height, {}};
   picture.rgb.assign(static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height) * 3, 12);

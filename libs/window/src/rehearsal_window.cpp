@@ -502,22 +502,6 @@ class RehearsalWindow {
     message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
   }
 
-  // The words of the import's verdict.
-  void scan_notes() {
-    if (scan_.status.empty()) return;
-    const bool open = ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan_.status.c_str(), static_cast<int>(scan_.findings.size()));
-    if (!open) return;
-    for (const Finding& f : scan_.findings) {
-      const ImVec4 colour = f.severity == Severity::info ? ImVec4(0.75F, 0.8F, 0.85F, 1) : ImVec4(1.0F, 0.8F, 0.35F, 1);
-      ImGui::PushStyleColor(ImGuiCol_Text, colour);
-      ImGui::TextWrapped("%s [%s]", f.message.c_str(), f.code.c_str());
-      ImGui::PopStyleColor();
-      if (!f.advice.empty()) ImGui::TextWrapped("%s", f.advice.c_str());
-    }
-    ImGui::TreePop();
-    ImGui::Separator();
-  }
-
   void panel() {
     Rehearsal& rehearsal = actions_.rehearsal();
     const TickRecord tick = rehearsal.latest();
@@ -564,7 +548,7 @@ class RehearsalWindow {
                 static_cast<double>(world_view_->triangles()) / 1e6);
     ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
-    scan_notes();
+    draw_scan(scan_);
     ImGui::TextWrapped("F1: mouse and keys");
     if (std::chrono::steady_clock::now() < message_until_) {
       ImGui::Separator();

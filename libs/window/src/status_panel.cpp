@@ -49,4 +49,20 @@ void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
   ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
 }
 
+// The words of the import's verdict.
+void draw_scan(const VerdictSummary& scan) {
+  if (scan.status.empty()) return;
+  const bool open = ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
+  if (!open) return;
+  for (const Finding& f : scan.findings) {
+    const ImVec4 colour = f.severity == Severity::info ? ImVec4(0.75F, 0.8F, 0.85F, 1) : ImVec4(1.0F, 0.8F, 0.35F, 1);
+    ImGui::PushStyleColor(ImGuiCol_Text, colour);
+    ImGui::TextWrapped("%s [%s]", f.message.c_str(), f.code.c_str());
+    ImGui::PopStyleColor();
+    if (!f.advice.empty()) ImGui::TextWrapped("%s", f.advice.c_str());
+  }
+  ImGui::TreePop();
+  ImGui::Separator();
+}
+
 }  // namespace osteo

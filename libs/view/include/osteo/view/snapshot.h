@@ -31,9 +31,6 @@ struct SnapshotSubjects {
 /// Works without a display. Error(failed) when there is no OpenGL.
 [[nodiscard]] Picture snapshot(const SnapshotSubjects& subjects, const SnapshotParams& params, const Context& context = {});
 
-/// A ball of `radius_mm` around `centre_mm` of a surface, lit, seen from `eye` (unit, LPS). Errors as of snapshot.
-[[nodiscard]] Picture draw_surface(const TriMesh& mesh, Vec3 centre_mm, double radius_mm, Vec3 eye, int width, int height);
-
 struct SnapshotStage {
   using Params = SnapshotParams;
   static void describe(Params& p, auto& visit) {
