@@ -8,6 +8,7 @@
 
 #include "bar.h"
 #include "osteo/bone/live_surface.h"
+#include "osteo/bone/plate_fit.h"
 #include "osteo/bone/plates.h"
 #include "osteo/mesh/mesh_info.h"
 
@@ -126,7 +127,8 @@ TEST(World, PlatesJoinPiecesAndADistractorOpens) {
   World w(bar(0.5, 0));
   w.act(SceneAction::saw(kMiddle));
   w.act(SceneAction::split(1));
-  const auto distractor = static_cast<std::uint32_t>(plate_index("distractor")), mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
+  const auto distractor = static_cast<std::uint32_t>(plate_index("distractor")),
+             mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
   const RigidTransform on_top{{}, {2, 0, 4}};
   EXPECT_FALSE(w.act(SceneAction::open(1, 5)).done);
   ASSERT_TRUE(w.act(SceneAction::attach(distractor, on_top, 0, 1)).done);
@@ -162,8 +164,8 @@ TEST(World, RefusesWhatMakesNoSense) {
   unknown.kind = 77;
   for (const SceneAction& a :
        {SceneAction::move(5, {}), SceneAction::move(0, mirrored), SceneAction::attach(99, {}, 0), SceneAction::attach(0, {}, 0, 0),
-        SceneAction::attach(0, {}, 0, 9), SceneAction::detach(3), SceneAction::saw({{500, 0, 0}, {1, 0, 0}}), SceneAction::saw({{0, 0, 0}, {0, 0, 0}}),
-        SceneAction::split(1), nan, unknown}) {
+        SceneAction::attach(0, {}, 0, 9), SceneAction::detach(3), SceneAction::saw({{500, 0, 0}, {1, 0, 0}}),
+        SceneAction::saw({{0, 0, 0}, {0, 0, 0}}), SceneAction::split(1), nan, unknown}) {
     const auto e = w.act(a);
     EXPECT_FALSE(e.done) << a.kind;
     EXPECT_FALSE(e.message.empty());
@@ -210,10 +212,51 @@ TEST(Plates, AreClosedAndOfTheirSize) {
         if (s.outwards.z < -0.9) flat = std::max(flat, std::abs(s.at_mm.z + 0.1));
         mean += s.outwards * s.area_mm2;
       }
-      EXPECT_LT(length(mean), 0.15 * all) << p.name;  // a closed surface
+      EXPECT_LT(length(mean), 0.15 * all) << p.name;                // a closed surface
       EXPECT_TRUE(p.most_opening_mm > 0 || flat < 0.12) << p.name;  // but for the rounding of its edges
       EXPECT_GT(under, 0.15 * all);
     }
+  }
+}
+
+// Against planes: how far below each point of a plate the bone's flat face is, level and tilted, also sunk in; and whose it is.
+TEST(Plates, GapsToAFlatFace) {
+  for (const double h : {0.25, 0.5}) {
+    World w(bar(h, 0.3));
+    w.act(SceneAction::saw({{1, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1.0}));
+    w.act(SceneAction::split(1));
+    const PlateModel& plate = plate_library()[static_cast<std::size_t>(plate_index("miniplate-4"))];
+    for (const double tilt : {0.0, 0.1}) {
+      for (const double gap : {0.7, 0.0, -0.4}) {
+        const RigidTransform pose = RigidTransform{{}, {1, 0, 4 + gap}} * rotation_about({}, {0, 1, 0}, tilt);
+        double worst = 0, sum = 0;
+        int met = 0, none = 0;
+        for (const PlateGap& g : plate_gaps(w, plate, pose, 0, 400, 5)) {
+          const Vec3 p = pose(g.at_mm);
+          // Where the screw's line meets the plane z = 4.
+          const double exact = (p.z - 4) / std::cos(tilt);
+          const Vec3 foot = p - pose.rotation.column[2] * exact;
+          if (std::abs(foot.y) > 4.5 || std::abs(foot.x) > 14 || std::abs(foot.x - 1) < 1.2 || exact < -0.9) continue;  // edges, the cut
+          if (g.body == SceneAction::kNobody) {
+            ++none;
+            continue;
+          }
+          ++met;
+          worst = std::max(worst, std::abs(g.gap_mm - exact));
+          sum += std::abs(g.gap_mm - exact);
+          EXPECT_EQ(w.find(g.body) != nullptr, true);
+        }
+        EXPECT_GT(met, 150);
+        EXPECT_EQ(none, 0);
+        EXPECT_LT(sum / met, 0.1 * h) << h << ' ' << tilt << ' ' << gap;
+        EXPECT_LT(worst, 0.35 * h) << h << ' ' << tilt << ' ' << gap;
+      }
+    }
+    const auto both = bodies_under(w, plate, {{}, {1, 0, 4.3}});
+    EXPECT_EQ(both.size(), 2u);
+    EXPECT_EQ(bodies_under(w, plate, {{}, {1, 0, 8}}).size(), 0u);
+    const auto one = bodies_under(w, plate_library()[static_cast<std::size_t>(plate_index("midface-4"))], {{}, {-11, 0, 4.3}});
+    EXPECT_EQ(one.size(), 1u);
   }
 }
 
