@@ -40,7 +40,8 @@ void latency(const BrickGrid& bone, const Context& context) {
       "## From bone removed to triangles ready: by the clock, 1 kHz, head at 0.5 mm, the follower's thread beside the servo's\n\n"
       "| burr | followed | p50 ms | p99 ms | p99.9 ms | worst ms | ticks that removed bone |\n|---|---|---|---|---|---|---|\n");
   for (const int diameter : {4, 6}) {
-    for (const FollowerParts parts : {FollowerParts{true, false, false}, FollowerParts{true, true, false}, FollowerParts{true, true, true}}) {
+    for (const FollowerParts parts :
+         {FollowerParts{true, false, false}, FollowerParts{true, true, false}, FollowerParts{true, true, true}}) {
       const int tool = burr_index(BurrKind::cutting, diameter);
       ScriptedDevice device(make_default_script(World(BrickGrid(bone)), true, tool, 12), 1000);
       HapticSetup setup;
@@ -72,8 +73,9 @@ void latency(const BrickGrid& bone, const Context& context) {
         if (n == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
       loop.join();
-      std::printf("| %d mm | surface%s%s | %.2f | %.2f | %.2f | %.2f | %zu |\n", diameter, parts.pieces ? ", pieces" : "", parts.dust ? ", dust" : "",
-                  quantile(waits, 0.5), quantile(waits, 0.99), quantile(waits, 0.999), quantile(waits, 1), waits.size());
+      std::printf("| %d mm | surface%s%s | %.2f | %.2f | %.2f | %.2f | %zu |\n", diameter, parts.pieces ? ", pieces" : "",
+                  parts.dust ? ", dust" : "", quantile(waits, 0.5), quantile(waits, 0.99), quantile(waits, 0.999), quantile(waits, 1),
+                  waits.size());
     }
   }
   std::printf("\n");
@@ -93,7 +95,8 @@ void pieces(const BrickGrid& bone, const Context& context) {
     std::int64_t t = monotonic_ns();
     const World::Effect e = world.act(a, [&](std::uint32_t id) { return follower.components(id); });
     const std::string name(name_of(static_cast<ActionKind>(a.kind)));
-    std::printf("| %s: bone%s | %.1f |\n", name.c_str(), a.is(ActionKind::split) ? (" of " + std::to_string(world.bodies().size()) + " bodies").c_str() : "", ms_since(t));
+    std::printf("| %s: bone%s | %.1f |\n", name.c_str(),
+                a.is(ActionKind::split) ? (" of " + std::to_string(world.bodies().size()) + " bodies").c_str() : "", ms_since(t));
     t = monotonic_ns();
     follower.follow(world, e);
     std::printf("| %s: surfaces and labels | %.1f |\n", name.c_str(), ms_since(t));
@@ -102,7 +105,9 @@ void pieces(const BrickGrid& bone, const Context& context) {
     std::printf("| %s: what the servo keeps (side by side with the surfaces) | %.1f |\n", name.c_str(), ms_since(t));
     scene = std::move(next);
   }
-  std::printf("\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| action | ms, five runs |\n|---|---|\n");
+  std::printf(
+      "\nThe same by the clock, from the hold (nothing is removed) to the tick where the new bodies are touched:\n\n| action | ms, five "
+      "runs |\n|---|---|\n");
   std::map<std::string, std::vector<std::uint64_t>> held;
   for (int run = 0; run < 5; ++run) {
     Script script = make_default_script(World(BrickGrid(bone)), true, burr_index(BurrKind::cutting, 4), 3);
@@ -119,8 +124,10 @@ void pieces(const BrickGrid& bone, const Context& context) {
     r.stop();
     std::uint64_t begin = 0;
     for (const RecordedAction& a : read_session(o.session_file).actions) {
-      if (a.action.is(ActionKind::hold)) begin = a.action.tick;
-      else held[std::string(name_of(static_cast<ActionKind>(a.action.kind)))].push_back(a.action.tick - begin);
+      if (a.action.is(ActionKind::hold))
+        begin = a.action.tick;
+      else
+        held[std::string(name_of(static_cast<ActionKind>(a.action.kind)))].push_back(a.action.tick - begin);
     }
     std::filesystem::remove(o.session_file);
   }
@@ -133,31 +140,35 @@ void pieces(const BrickGrid& bone, const Context& context) {
 }
 
 void plates(const BrickGrid& bone) {
-  std::printf("## Plates: contact by samples traced through live bone, on the head\n\n| plate | samples | us a tick in air | us on bone | samples in bone |\n|---|---|---|---|---|\n");
+  std::printf(
+      "## Plates: contact by samples traced through live bone, on the head\n\n| plate | samples | us 0.1 mm into bone, samples in it | us "
+      "0.5 mm "
+      "into bone, samples in it |\n|---|---|---|---|\n");
   World world{BrickGrid(bone)};
   HapticSetup setup;
   setup.device = SpringHand::traits();
   const HapticScene scene = HapticScene::of(world, setup);
-  // On the side of the head.
-  const Vec3 at = make_default_script(World(BrickGrid(bone)), true, 3, 5).waypoints[1].at_mm;
+  // On the side of the head: the second point of the strokes lies a burr's radius and a millimetre before it.
+  const int tool = 3;
+  const Vec3 at = make_default_script(World(BrickGrid(bone)), true, tool, 5).waypoints[1].at_mm;
+  const double before = burr_library()[tool].diameter_mm / 2 + 1;
   for (const PlateModel& plate : plate_library()) {
     for (const int count : {100, 600, 2000}) {
       const PlateInHand hand(plate, count);
-      double us[2] = {};
-      std::uint32_t in_bone = 0;
-      for (const int on : {0, 1}) {
-        // The plate's underside towards the head, 3.5 mm below where the burr began.
-        const RigidTransform pose{frame_of_axis({1, 0, 0}), at + Vec3{on != 0 ? -3.5 : 40.0, 0, 0}};
+      std::printf("| %s | %zu |", plate.name.c_str(), hand.samples.size());
+      for (const double depth : {0.1, 0.5}) {
+        const RigidTransform pose{frame_of_axis({1, 0, 0}), at - Vec3{before + depth, 0, 0}};
         std::vector<double> times;
+        std::uint32_t in_bone = 0;
         for (int n = 0; n < 300; ++n) {
           const std::int64_t t = monotonic_ns();
           const ContactResult r = plate_contact(hand, pose, scene.items, setup.params.contact);
           times.push_back(static_cast<double>(monotonic_ns() - t) / 1e3);
           in_bone = r.immersed;
         }
-        us[on] = quantile(times, 0.5);
+        std::printf(" %.0f, %u |", quantile(times, 0.5), in_bone);
       }
-      std::printf("| %s | %zu | %.1f | %.1f | %u |\n", plate.name.c_str(), hand.samples.size(), us[0], us[1], in_bone);
+      std::printf("\n");
     }
   }
   std::printf("\n");
@@ -167,9 +178,9 @@ void plates(const BrickGrid& bone) {
 
 void bench_operation(const Context& context) {
   const BrickGrid bone = head(0.5, context);
+  plates(bone);
   latency(bone, context);
   pieces(bone, context);
-  plates(bone);
 }
 
 }  // namespace osteo
