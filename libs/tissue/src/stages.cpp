@@ -247,7 +247,7 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   options.density_kg_m3 = p.density_kg_m3;
   options.damping_per_s = p.damping_per_s;
   options.least_step_s = p.least_step_ms / 1000;
-  TissueDynamics<float> dynamics(model, problem.fixed, options);
+  TissueDynamics<double> dynamics(model, problem.fixed, options);  // as quick, and single precision never balances to a thousandth
   dynamics.set_load(problem.loads[n].forces_n);
   const auto steps = static_cast<long>(std::ceil(p.seconds / dynamics.step_s()));
   long done = 0;

@@ -69,9 +69,9 @@ struct CalibrateStage {
 
 struct SimulateParams {
   std::string load;
-  double seconds = 1;
+  double seconds = 3;
   double density_kg_m3 = 1000;
-  double damping_per_s = 30;
+  double damping_per_s = 60;
   double least_step_ms = 0;
   bool until_rest = true;
 };
