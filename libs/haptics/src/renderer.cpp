@@ -100,7 +100,7 @@ void HapticRenderer::combine(Vec3 axis) noexcept {
     if (touched_[i].contact.bone_mm3 > touched_[most].contact.bone_mm3) most = i;
   }
   if (touched_count_ == 0) return;
-  loaded_ = touched_[most].item->bone.get();
+  loaded_ = touched_[most].item;
   contact_ = touched_[most].contact;
   if (in_bone < 2) return;
   OverlapResult sum;
@@ -133,11 +133,10 @@ void HapticRenderer::combine(Vec3 axis) noexcept {
 void HapticRenderer::escape(Vec3 at_mm, double radius_mm, double full_mm3) noexcept {
   const double full = contact_.bone_mm3 / full_mm3;
   const double share = std::clamp((full - kEscapeFrom) / (kEscapeAll - kEscapeFrom), 0.0, 1.0);
-  if (share <= 0 || loaded_ == nullptr || !loaded_->depth_map_) return;
-  const auto item = std::find_if(scene_->items.begin(), scene_->items.end(), [&](const auto& i) { return i.bone.get() == loaded_; });
-  DepthMap::Answer out = loaded_->depth_map_->at(item->body_from_world(at_mm));
+  if (share <= 0 || loaded_ == nullptr || !loaded_->bone->depth_map_) return;
+  DepthMap::Answer out = loaded_->bone->depth_map_->at(loaded_->body_from_world(at_mm));
   if (out.outwards == Vec3{}) return;
-  out.outwards = item->world_from_body.rotation * out.outwards;
+  out.outwards = loaded_->world_from_body.rotation * out.outwards;
   const double law = setup_.params.contact.force_n(out.depth_mm + radius_mm);
   contact_.force_n = contact_.force_n * (1 - share) + out.outwards * (law * share);
   contact_.normal = normalized(contact_.normal * (1 - share) + out.outwards * share);
@@ -170,13 +169,12 @@ void HapticRenderer::shaft(Vec3 at, Vec3 axis, Vec3& elastic, Vec3& torque) noex
 
 // Under the deepest point of the head.
 double HapticRenderer::thickness(Vec3 at, Vec3 axis) const noexcept {
-  const auto item = std::find_if(scene_->items.begin(), scene_->items.end(), [&](const auto& i) { return i.bone.get() == loaded_; });
-  const BrickGrid& bone = loaded_->bone_;
+  const BrickGrid& bone = loaded_->bone->bone_;
   const RoundCone head = burr_library()[last_good_.tool].head();
   const Vec3 away = contact_.normal;
   const double foot = dot(away, axis) < 0 ? head.length_mm : 0;
   const Vec3 deepest = at + contact_.shown_offset_mm + axis * foot - away * head.radius_at_mm(foot);
-  const RigidTransform& own = item->body_from_world;
+  const RigidTransform& own = loaded_->body_from_world;
   return thickness_mm(bone, own(deepest + away * bone.frame().spacing_mm.x), own.rotation * -away);
 }
 
@@ -240,7 +238,7 @@ HapticRenderer::Step HapticRenderer::step(const DeviceSample& sample) noexcept {
     touch(pose);
     combine(axis);
     const RoundCone head = burr.head();
-    const bool proxy = loaded_ != nullptr && loaded_->method_of_tool_[pose.tool] == ContactMethod::proxy;
+    const bool proxy = loaded_ != nullptr && loaded_->bone->method_of_tool_[pose.tool] == ContactMethod::proxy;
     if (contact_.bone_mm3 > 0 && !proxy) escape(at, head.largest_radius_mm(), head.volume_mm3());
   }
 

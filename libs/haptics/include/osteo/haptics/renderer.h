@@ -73,7 +73,7 @@ class HapticRenderer {
   } soft_;
   std::array<Touch, kMostTouched> touched_;
   std::size_t touched_count_ = 0;
-  const TouchedBone* loaded_ = nullptr;  // that the tool presses on most
+  const HapticScene::Item* loaded_ = nullptr;  // that the tool presses on most
   Vibration vibration_;
   std::optional<Curve> curve_;
   std::optional<CurveConstraint> constraint_;
