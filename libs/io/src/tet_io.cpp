@@ -16,6 +16,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
+#include "osteo/io/inp_io.h"
 #include "osteo/io/vtk_data.h"
 
 namespace osteo {
@@ -153,12 +154,15 @@ void append_number(std::string& text, double v) {
 
 bool is_tet_file(const fs::path& path) {
   const std::string s = suffix_of(path);
-  return s == ".vtu" || s == ".node" || s == ".ele";
+  return s == ".vtu" || s == ".node" || s == ".ele" || s == ".inp";
 }
 
 Tets load_tets(const fs::path& path) {
   require_readable(path);
-  auto mesh = std::make_shared<TetMesh>(suffix_of(path) == ".vtu" ? load_vtu(path) : load_tetgen(path));
+  const std::string s = suffix_of(path);
+  auto mesh = std::make_shared<TetMesh>(s == ".vtu"   ? load_vtu(path)
+                                        : s == ".inp" ? parse_inp(text_of(path), path.string()).mesh
+                                                      : load_tetgen(path));
   if (mesh->tets.empty()) throw Error(ExitCode::corrupt, "'" + path.string() + "' holds no tetrahedra");
   turn_round(*mesh);
   return mesh;
@@ -226,7 +230,8 @@ void save_tets(const TetMesh& mesh, const fs::path& path) {
     return;
   }
   if (s != ".node" && s != ".ele") {
-    throw Error(ExitCode::usage, "cannot write tetrahedra as '" + path.filename().string() + "'", "name it .vtu, .node or .ele");
+    throw Error(ExitCode::usage, "cannot write tetrahedra as '" + path.filename().string() + "'",
+                "name it .vtu, .node or .ele; fem writes .inp with a problem in it (--inp-out)");
   }
   fs::path node = path, ele = path;
   node.replace_extension(".node");

@@ -59,6 +59,7 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
     if (!accepts(accepted, DataKind::surface)) throw wrong(DataKind::surface);
     return load_surface(path);
   }
+  if (path.extension() == ".inp" && accepts(accepted, DataKind::document)) return Document{read_text(path)};
   if (is_tet_file(path)) {
     if (!accepts(accepted, DataKind::tets)) throw wrong(DataKind::tets);
     return load_tets(path);

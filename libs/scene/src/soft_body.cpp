@@ -29,7 +29,7 @@ struct SoftBody::Impl {
   bool pushed = false;
 
   Impl(TissueModel m, const TissueProblem& problem, const TetMesh& mesh)
-      : model(std::move(m)), dynamics(model, problem.fixed, {.density_kg_m3 = 1000, .damping_per_s = kDampingPerS}) {
+      : model(std::move(m)), dynamics(model, problem.fixed, {.density_kg_m3 = 1000, .damping_per_s = kDampingPerS}, problem.sliders) {
     surface = boundary_of(mesh, &point_of);
     const double wanted = 1 / kUpdatesPerS / dynamics.step_s();
     steps = static_cast<int>(std::clamp(std::round(wanted), 1.0, double{kMostSteps}));

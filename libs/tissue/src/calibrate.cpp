@@ -72,13 +72,15 @@ std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& gr
 class Fit {
  public:
   Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
-      : model_(model), cases_(cases), options_(options), context_(context), solver_(model, model.rest(), cases.front().load.fixed) {
-    const auto sorted = [](std::vector<std::uint32_t> v) {
-      std::sort(v.begin(), v.end());
-      return v;
+      : model_(model), cases_(cases), options_(options), context_(context), solver_(model, model.rest(), cases.front().load) {
+    const auto held = [&](const TissueLoad& load) {
+      std::vector<std::uint8_t> axes(model.point_count());
+      for (const std::uint32_t p : load.fixed) axes.at(p) = 7;
+      for (const Slider& s : load.sliders) axes.at(s.point) = static_cast<std::uint8_t>(axes.at(s.point) | s.held);
+      return axes;
     };
     for (const CalibrationCase& c : cases) {
-      if (sorted(c.load.fixed) != sorted(cases.front().load.fixed)) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
+      if (held(c.load) != held(cases.front().load)) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
       if (c.truth_mm.size() != model.point_count())
         throw Error(ExitCode::usage, "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
       double sum = 0;
@@ -333,7 +335,7 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
 
   // Before: the closed form, as the model stands without factors.
   {
-    EquilibriumSolver solver(model, model.rest(), cases.front().load.fixed);
+    EquilibriumSolver solver(model, model.rest(), cases.front().load);
     TissueModel plain = model;
     plain.scale({1, 1, 0, 1});
     for (const CalibrationCase& c : cases) {

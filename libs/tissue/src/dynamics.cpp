@@ -73,6 +73,7 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Real> lx, ly, lz;                       // load
   std::vector<double> mass;
   std::vector<bool> fixed;
+  std::vector<Slider> sliders;
   std::vector<std::uint32_t> edge, face, voxel[2], tet;
   std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
   tissue::Arrays<Real> arrays;
@@ -167,7 +168,8 @@ double TissueDynamics<Real>::Impl::certify() {
 }
 
 template <class Real>
-TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options)
+TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options,
+                                     std::span<const Slider> sliders)
     : impl_(std::make_unique<Impl>(model, options)) {
   Impl& m = *impl_;
   if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
@@ -177,6 +179,11 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
     if (p >= n) throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(n));
     m.fixed[p] = true;
   }
+  for (const Slider& s : sliders) {
+    if (s.point >= n)
+      throw Error(ExitCode::usage, "point " + std::to_string(s.point) + " is to slide, but there are only " + std::to_string(n));
+  }
+  m.sliders.assign(sliders.begin(), sliders.end());
   m.mass.assign(n, 0);
   for (const auto& t : model.tets()) {
     const auto& r = model.rest();
@@ -207,8 +214,10 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
     m.lx[p] += static_cast<Real>(f.x);
     m.ly[p] += static_cast<Real>(f.y);
     m.lz[p] += static_cast<Real>(f.z);
-    m.load_size = std::max(m.load_size, length(f));
   }
+  for (std::size_t p = 0; p < m.x.size(); ++p)
+    m.load_size =
+        std::max(m.load_size, std::hypot(static_cast<double>(m.lx[p]), static_cast<double>(m.ly[p]), static_cast<double>(m.lz[p])));
 }
 
 template <class Real>
@@ -242,7 +251,17 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   function(arrays);
   Vec3 on_tool{};
   met = 0;
-  if (!tool) return on_tool;
+  const auto hold = [&] {
+    for (const Slider& q : sliders) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        if ((q.held >> a & 1) != 0) (a == 0 ? fx : a == 1 ? fy : fz)[q.point] = 0;
+      }
+    }
+  };
+  if (!tool) {
+    hold();
+    return on_tool;
+  }
   const Real cx = static_cast<Real>(tool->centre_mm.x), cy = static_cast<Real>(tool->centre_mm.y),
              cz = static_cast<Real>(tool->centre_mm.z);
   const Real r = static_cast<Real>(tool->radius_mm), k = static_cast<Real>(tool->stiffness_n_per_mm);
@@ -256,6 +275,7 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
     fz[p] += push * dz;
     on_tool -= Vec3{static_cast<double>(push * dx), static_cast<double>(push * dy), static_cast<double>(push * dz)};
   }
+  hold();
   return on_tool;
 }
 

@@ -1,5 +1,6 @@
 #include "osteo/tissue/equilibrium.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
@@ -19,17 +20,59 @@ std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   return i;
 }
 
+// Of the six rigid motions of a part, how many the given axes of points leave free: rank of the moved distances, lengths taken relative to
+// the part's size.
+int free_motions(std::span<const std::pair<Vec3, std::uint8_t>> held) {
+  if (held.empty()) return 6;
+  Vec3 middle{};
+  for (const auto& [p, axes] : held) middle += p / static_cast<double>(held.size());
+  double size = 0;
+  for (const auto& [p, axes] : held) size = std::max(size, length(p - middle));
+  Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
+  for (const auto& [p, axes] : held) {
+    const Vec3 r = size > 0 ? (p - middle) / size : Vec3{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      if ((axes >> a & 1) == 0) continue;
+      Vec3 e{};
+      e[a] = 1;
+      const Vec3 turn = cross(r, e);
+      Eigen::Matrix<double, 6, 1> row;
+      row << e.x, e.y, e.z, turn.x, turn.y, turn.z;
+      gram += row * row.transpose();
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(gram, Eigen::EigenvaluesOnly);
+  int left = 0;
+  for (int i = 0; i < 6; ++i) left += eigen.eigenvalues()[i] > 1e-14 * eigen.eigenvalues()[5] ? 0 : 1;
+  return left;
+}
+
+constexpr std::uint8_t kAllAxes = 7;
+
 }  // namespace
+
+void TissueLoad::add_on_face(const std::array<std::uint32_t, 3>& corners, Vec3 force_n) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    edge_forces_n.push_back({{corners[i], corners[(i + 1) % 3]}, force_n / 3});
+    forces_n.push_back({corners[i], force_n / 3});
+  }
+}
 
 struct EquilibriumSolver::Impl {
   std::vector<std::uint32_t> number;  // of a point among those that move
   std::size_t moving = 0;
+  std::vector<std::uint8_t> held;    // axes of each point that do not move
   std::vector<std::uint32_t> first;  // of each element in slots
   std::vector<std::int64_t> slots;   // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
   Matrix h;
   Eigen::SimplicialLLT<Matrix, Eigen::Lower> factor;
   bool analysed = false;
 
+  // What of a vector at a point lies along axes that may move.
+  [[nodiscard]] Vec3 of_free(std::uint32_t p, Vec3 v) const {
+    for (std::size_t a = 0; a < 3; ++a) v[a] = (held[p] >> a & 1) != 0 ? 0 : v[a];
+    return v;
+  }
   void pattern(const Energy& energy);
   void assemble(const Energy& energy, std::span<const Vec3> x, std::vector<Vec3>& gradient);
 };
@@ -104,24 +147,42 @@ void EquilibriumSolver::Impl::assemble(const Energy& energy, std::span<const Vec
         const std::int64_t step = h.outerIndexPtr()[3 * j + 1] - h.outerIndexPtr()[3 * j];
         for (std::size_t c = 0; c < 3; ++c) {
           double* const value = h.valuePtr() + *slot + static_cast<std::int64_t>(c) * step;
-          for (std::size_t r = 0; r < 3; ++r) value[r] += k[(3 * a + r) * 3 * n + 3 * b + c];
+          const double* const own = k + 3 * a * 3 * n + 3 * b + c;
+          if ((held[nodes[a]] | held[nodes[b]]) == 0) {
+            for (std::size_t r = 0; r < 3; ++r) value[r] += own[r * 3 * n];
+            continue;
+          }
+          // An axis that is held keeps a diagonal alone, whose size is that of its neighbours'.
+          for (std::size_t r = 0; r < 3; ++r) {
+            const bool off = (held[nodes[a]] >> r & 1) != 0 || (held[nodes[b]] >> c & 1) != 0;
+            if (!off) value[r] += own[r * 3 * n];
+            if (off && a == b && r == c) value[r] += std::abs(own[r * 3 * n]);
+          }
         }
       }
     }
   }
 }
 
-EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed)
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, const TissueLoad& held)
+    : EquilibriumSolver(energy, rest, held.fixed, held.sliders) {}
+
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
+                                     std::span<const Slider> sliders)
     : impl_(std::make_unique<Impl>()) {
   const std::size_t points = energy.point_count();
   if (rest.size() != points) throw Error(ExitCode::usage, "the rest shape has another number of points than the model");
-  std::vector<bool> is_fixed(points), used(points);
-  for (const std::uint32_t p : fixed) {
+  std::vector<std::uint8_t>& held = impl_->held;
+  held.assign(points, 0);
+  const auto hold = [&](std::uint32_t p, std::uint8_t axes) {
     if (p >= points)
       throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
-    is_fixed[p] = true;
-  }
-  // Parts that hang together: each must be held.
+    held[p] = static_cast<std::uint8_t>(held[p] | (axes & kAllAxes));
+  };
+  for (const std::uint32_t p : fixed) hold(p, kAllAxes);
+  for (const Slider& s : sliders) hold(s.point, s.held);
+  // Parts that hang together: each must be held. An element of one point holds it in place.
+  std::vector<bool> used(points), anchored(points);
   std::vector<std::uint32_t> parent(points);
   std::iota(parent.begin(), parent.end(), 0U);
   for (std::size_t e = 0; e < energy.element_count(); ++e) {
@@ -133,29 +194,24 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
       const std::uint32_t a = root(parent, nodes[0]), b = root(parent, p);
       if (a != b) parent[std::max(a, b)] = std::min(a, b);
     }
+    if (nodes.size() == 1) anchored[nodes[0]] = true;
   }
-  std::vector<std::vector<std::uint32_t>> held(points);
+  std::vector<std::vector<std::pair<Vec3, std::uint8_t>>> holds(points);
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (used[p] && is_fixed[p]) held[root(parent, p)].push_back(p);
+    if (used[p] && (held[p] != 0 || anchored[p])) holds[root(parent, p)].push_back({rest[p], anchored[p] ? kAllAxes : held[p]});
   }
   for (std::uint32_t p = 0; p < points; ++p) {
     if (!used[p] || root(parent, p) != p) continue;
-    bool enough = false;
-    const auto& h = held[p];
-    for (std::size_t i = 2; i < h.size() && !enough; ++i) {
-      const Vec3 a = rest[h[1]] - rest[h[0]], b = rest[h[i]] - rest[h[0]];
-      enough = length(cross(a, b)) > 1e-9 * (dot(a, a) + dot(b, b));
-    }
-    if (!enough) {
-      throw Error(
-          ExitCode::usage,
-          "the part of the body with point " + std::to_string(p) + " can move freely: it has " + std::to_string(h.size()) + " fixed points",
-          "fix at least three of its points that do not lie in a line, or leave the part out");
+    if (const int left = free_motions(holds[p]); left > 0) {
+      throw Error(ExitCode::usage,
+                  "the part of the body with point " + std::to_string(p) + " can move freely: of its six rigid motions " +
+                      std::to_string(holds[p].size()) + " points that are held stop " + std::to_string(6 - left),
+                  "fix at least three of its points that do not lie in a line, or leave the part out");
     }
   }
   impl_->number.assign(points, kFixed);
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (used[p] && !is_fixed[p]) impl_->number[p] = static_cast<std::uint32_t>(impl_->moving++);
+    if (used[p] && held[p] != kAllAxes) impl_->number[p] = static_cast<std::uint32_t>(impl_->moving++);
   }
   impl_->pattern(energy);
 }
@@ -178,7 +234,9 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
   const auto free = [&](std::uint32_t p) { return m.number[p] != kFixed; };
   double load_size = 0;
   for (std::uint32_t p = 0; p < x.size(); ++p) {
-    if (free(p)) load_size += dot(load[p], load[p]);
+    if (!free(p)) continue;
+    load[p] = m.of_free(p, load[p]);
+    load_size += dot(load[p], load[p]);
   }
   load_size = std::sqrt(load_size);
   double share = 0, extent = 0;
@@ -206,7 +264,7 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
       double residual = 0;
       for (std::uint32_t p = 0; p < x.size(); ++p) {
         if (!free(p)) continue;
-        const Vec3 r = load[p] * share - gradient[p];
+        const Vec3 r = m.of_free(p, load[p] * share - gradient[p]);
         residual += dot(r, r);
         for (std::size_t a = 0; a < 3; ++a) right[static_cast<Eigen::Index>(3 * m.number[p] + a)] = r[a];
       }
@@ -274,7 +332,7 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
           total_gradient(energy, trial, gradient);
           double after = 0;
           for (std::uint32_t p = 0; p < x.size(); ++p) {
-            const Vec3 r = load[p] * share - gradient[p];
+            const Vec3 r = m.of_free(p, load[p] * share - gradient[p]);
             after += free(p) ? dot(r, r) : 0;
           }
           if (std::sqrt(after) < 0.5 * residual) {
@@ -308,7 +366,8 @@ void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> 
   Eigen::VectorXd b(static_cast<Eigen::Index>(3 * m.moving));
   for (std::uint32_t p = 0; p < right.size(); ++p) {
     if (m.number[p] == kFixed) continue;
-    for (std::size_t a = 0; a < 3; ++a) b[static_cast<Eigen::Index>(3 * m.number[p] + a)] = right[p][a];
+    const Vec3 r = m.of_free(p, right[p]);
+    for (std::size_t a = 0; a < 3; ++a) b[static_cast<Eigen::Index>(3 * m.number[p] + a)] = r[a];
   }
   const Eigen::VectorXd answer = m.factor.solve(b);
   for (std::uint32_t p = 0; p < x.size(); ++p) {

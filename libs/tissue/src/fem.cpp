@@ -124,7 +124,9 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
     }
     const double w = g.weight_mm3;
     M3 p{}, inv{}, s{};
-    double log_j = 0;
+    // Of both neo-Hookean laws: P = along_f F + along_inv F^-T; dP/dF = along_f 1 - along_inv (F^-T dF^T F^-T) +
+    // mixed (F x F^-T + F^-T x F) + twice_inv F^-T x F^-T.
+    double along_f = 0, along_inv = 0, mixed = 0, twice_inv = lambda;
     if (law_ == ElasticLaw::linear) {
       double trace = 0, square = 0;
       for (int i = 0; i < 3; ++i) trace += f.m[i][i] - 1;
@@ -160,15 +162,26 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
     } else {
       const double det = determinant_of(f);
       if (!(det > 0)) return std::numeric_limits<double>::infinity();
-      log_j = std::log(det);
+      const double log_j = std::log(det);
       double norm = 0;
       for (const auto& row : f.m)
         for (const double v : row) norm += v * v;
-      energy += w * (0.5 * mu * (norm - 3) - mu * log_j + 0.5 * lambda * log_j * log_j);
+      if (law_ == ElasticLaw::neo_hooke) {
+        energy += w * (0.5 * mu * (norm - 3) - mu * log_j + 0.5 * lambda * log_j * log_j);
+        along_f = mu;
+        along_inv = lambda * log_j - mu;
+      } else {
+        const double bulk = mat.bulk_mpa(), shape = mu / std::cbrt(det * det);
+        energy += w * (0.5 * (shape * norm - 3 * mu) + 0.5 * bulk * (det - 1) * (det - 1));
+        along_f = shape;
+        along_inv = bulk * (det - 1) * det - shape * norm / 3;
+        mixed = -2.0 / 3 * shape;
+        twice_inv = bulk * (2 * det - 1) * det + 2.0 / 9 * shape * norm;
+      }
       if (gradient == nullptr && hessian == nullptr) continue;
       inv = inverse_transposed(f, det);
       for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) p.m[i][j] = mu * f.m[i][j] + (lambda * log_j - mu) * inv.m[i][j];
+        for (int j = 0; j < 3; ++j) p.m[i][j] = along_f * f.m[i][j] + along_inv * inv.m[i][j];
     }
     if (gradient != nullptr) {
       for (std::size_t a = 0; a < n; ++a)
@@ -177,12 +190,13 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
     }
     if (hessian == nullptr) continue;
     // d(force a, i) / d(x b, k) = sum over j, l of grad_a[j] dP_ij/dF_kl grad_b[l].
-    Vec3 turned[kMostNodes];  // F^-T grad (neo_hooke), F grad (stvk)
+    Vec3 turned[kMostNodes], back[kMostNodes];  // F grad, F^-T grad
     for (std::size_t a = 0; a < n; ++a) {
       for (std::size_t i = 0; i < 3; ++i) {
-        double t = 0;
-        for (std::size_t j = 0; j < 3; ++j) t += (law_ == ElasticLaw::neo_hooke ? inv.m[i][j] : f.m[i][j]) * g.gradient[a][j];
-        turned[a][i] = t;
+        for (std::size_t j = 0; j < 3; ++j) {
+          turned[a][i] += f.m[i][j] * g.gradient[a][j];
+          back[a][i] += inv.m[i][j] * g.gradient[a][j];
+        }
       }
     }
     double left[3][3];  // F F^T (stvk)
@@ -205,7 +219,8 @@ double FemBody::element(std::size_t e, const Vec3* x, double* gradient, double* 
             } else if (law_ == ElasticLaw::stvk) {
               v = (i == k ? stress : 0) + mu * (left[i][k] * both + turned[b][i] * turned[a][k]) + lambda * turned[a][i] * turned[b][k];
             } else {
-              v = (i == k ? mu * both : 0) + (mu - lambda * log_j) * turned[b][i] * turned[a][k] + lambda * turned[a][i] * turned[b][k];
+              v = (i == k ? along_f * both : 0) - along_inv * back[b][i] * back[a][k] + twice_inv * back[a][i] * back[b][k];
+              if (mixed != 0) v += mixed * (turned[a][i] * back[b][k] + back[a][i] * turned[b][k]);
             }
             hessian[(3 * a + i) * 3 * n + 3 * b + k] += w * v;
           }
@@ -228,6 +243,35 @@ std::vector<std::uint32_t> FemBody::with_middles(std::span<const std::uint32_t> 
   return all;
 }
 
+TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
+  TissueLoad all = load;
+  if (per_ == 4) return all;
+  all.fixed = with_middles(load.fixed);
+  all.edge_forces_n.clear();
+  std::vector<std::uint8_t> held(corners_);
+  const auto hold = [&](std::uint32_t p, std::uint8_t axes) {
+    if (p < corners_) held[p] = static_cast<std::uint8_t>(held[p] | axes);
+  };
+  for (const std::uint32_t p : load.fixed) hold(p, 7);
+  for (const Slider& s : load.sliders) hold(s.point, s.held);
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t> middle;
+  for (std::size_t m = 0; m < middle_of_.size(); ++m) {
+    const auto [a, b] = middle_of_[m];
+    const auto point = static_cast<std::uint32_t>(corners_ + m);
+    const auto both = static_cast<std::uint8_t>(held[a] & held[b]);
+    if (both != 0 && both != 7) all.sliders.push_back({point, both});
+    if (!load.edge_forces_n.empty()) middle[{std::min(a, b), std::max(a, b)}] = point;
+  }
+  for (const auto& [edge, force] : load.edge_forces_n) {
+    const auto found = middle.find({std::min(edge[0], edge[1]), std::max(edge[0], edge[1])});
+    if (found == middle.end())
+      throw Error(ExitCode::usage, "a force acts between points " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]) + ", which no edge joins");
+    for (const std::uint32_t end : edge) all.forces_n.push_back({end, force * -0.5});
+    all.forces_n.push_back({found->second, force});
+  }
+  return all;
+}
+
 std::size_t FemBody::inverted(std::span<const Vec3> x) const {
   std::size_t count = 0;
   for (std::size_t e = 0; e < count_; ++e) {
@@ -242,51 +286,6 @@ std::size_t FemBody::inverted(std::span<const Vec3> x) const {
     count += bad ? 1 : 0;
   }
   return count;
-}
-
-std::string inp_text(const FemBody& body, const TissueLoad& load) {
-  if (body.law() == ElasticLaw::neo_hooke)
-    throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus", "write linear or stvk");
-  std::string t = "** written by osteotome: mm, N, MPa\n*NODE, NSET=ALL\n";
-  char line[160];
-  for (std::size_t p = 0; p < body.point_count(); ++p) {
-    const Vec3 x = body.rest()[p];
-    std::snprintf(line, sizeof line, "%zu, %.15g, %.15g, %.15g\n", p + 1, x.x, x.y, x.z);
-    t += line;
-  }
-  t += body.order() == TetOrder::t4 ? "*ELEMENT, TYPE=C3D4, ELSET=EALL\n" : "*ELEMENT, TYPE=C3D10, ELSET=EALL\n";
-  for (std::size_t e = 0; e < body.element_count(); ++e) {
-    t += std::to_string(e + 1);
-    for (const std::uint32_t n : body.nodes(e)) t += ", " + std::to_string(n + 1);
-    t += "\n";
-  }
-  // Equal materials share a set.
-  std::map<std::pair<double, double>, std::vector<std::size_t>> sets;
-  for (std::size_t e = 0; e < body.element_count(); ++e) {
-    const Material& m = body.materials()[body.materials().size() == 1 ? 0 : e];
-    sets[{m.young_mpa, m.poisson}].push_back(e + 1);
-  }
-  int number = 0;
-  for (const auto& [material, elements] : sets) {
-    ++number;
-    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*ELASTIC\n%.15g, %.15g\n*ELSET, ELSET=E%d\n", number, material.first, material.second, number);
-    t += line;
-    for (std::size_t i = 0; i < elements.size(); ++i) t += std::to_string(elements[i]) + (i % 12 == 11 || i + 1 == elements.size() ? "\n" : ", ");
-    std::snprintf(line, sizeof line, "*SOLID SECTION, ELSET=E%d, MATERIAL=M%d\n", number, number);
-    t += line;
-  }
-  t += "*BOUNDARY\n";
-  for (const std::uint32_t p : load.fixed) t += std::to_string(p + 1) + ", 1, 3\n";
-  t += body.law() == ElasticLaw::linear ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n1, 1\n";
-  t += "*CLOAD\n";
-  for (const auto& [p, f] : load.forces_n) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (f[a] == 0) continue;
-      std::snprintf(line, sizeof line, "%u, %zu, %.15g\n", p + 1, a + 1, f[a]);
-      t += line;
-    }
-  }
-  return t + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n";
 }
 
 }  // namespace osteo

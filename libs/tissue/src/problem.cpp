@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/tissue/calibrate.h"
+#include "problem_inp.h"
 
 namespace osteo {
 namespace {
@@ -32,6 +33,8 @@ Material material(const ordered_json& j) {
 }  // namespace
 
 TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads) {
+  if (const std::size_t first = json.find_first_not_of(" \t\r\n"); first != std::string_view::npos && json[first] == '*')
+    return tissue::problem_of_inp(json, mesh, needs_loads);
   TissueProblem problem;
   std::string where = "header";
   const auto refuse = [&](const std::string& what, const std::string& advice = {}) {
@@ -64,21 +67,50 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, b
     for (const auto& f : j.at("fixed")) {
       where = "fixed " + std::to_string(++number);
       const auto in = place(f);
+      std::uint8_t axes = 0;
+      for (const char c : f.value("axes", std::string("xyz"))) {
+        if (c < 'x' || c > 'z') throw refuse("\"axes\" are made of x, y and z, not '" + std::string(1, c) + "'");
+        axes = static_cast<std::uint8_t>(axes | 1 << (c - 'x'));
+      }
       std::size_t hit = 0;
       for (std::uint32_t p = 0; p < fixed.size(); ++p) {
         if (!in(from_floats(mesh.points_mm[p]))) continue;
         ++hit;
+        if (axes != 7) {
+          problem.sliders.push_back({p, axes});
+          continue;
+        }
         if (!fixed[p]) problem.fixed.push_back(p);
         fixed[p] = true;
       }
       if (hit == 0) throw refuse("no point lies in it", "places are LPS mm; mesh-info tells where the mesh is");
     }
     number = 0;
+    TriMesh boundary;
+    std::vector<std::uint32_t> point_of;
     for (const auto& l : needs_loads ? j.at("loads") : j.value("loads", ordered_json::array())) {
       where = "load " + std::to_string(++number);
       TissueLoad load;
       load.fixed = problem.fixed;
-      for (const auto& f : l.at("forces")) {
+      load.sliders = problem.sliders;
+      if (!l.contains("forces") && !l.contains("surfaces")) throw refuse("it has neither \"forces\" nor \"surfaces\"");
+      for (const auto& f : l.value("surfaces", ordered_json::array())) {
+        if (boundary.triangles.empty()) boundary = boundary_of(mesh, &point_of);
+        const auto in = place(f);
+        const auto& kpa = f.at("kpa");
+        std::size_t hit = 0;
+        for (const auto& t : boundary.triangles) {
+          const Vec3 a = from_floats(boundary.points_mm[t[0]]), b = from_floats(boundary.points_mm[t[1]]),
+                     c = from_floats(boundary.points_mm[t[2]]);
+          if (!in((a + b + c) / 3)) continue;
+          ++hit;
+          const Vec3 area = cross(b - a, c - a) * 0.5;  // outwards
+          load.add_on_face({point_of[t[0]], point_of[t[1]], point_of[t[2]]},
+                           kpa.is_array() ? vec(kpa) * (length(area) / 1000) : area * (-kpa.get<double>() / 1000));
+        }
+        if (hit == 0) throw refuse("no part of the body's surface lies where it is loaded", "make its place larger");
+      }
+      for (const auto& f : l.value("forces", ordered_json::array())) {
         const auto in = place(f);
         const Vec3 total = vec(f.at("total_n"));
         std::vector<std::uint32_t> near;

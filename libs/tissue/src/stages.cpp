@@ -14,8 +14,40 @@ namespace {
 
 using nlohmann::ordered_json;
 
-TetOrder order_of(OrderChoice choice) {
-  return choice == OrderChoice::t4 ? TetOrder::t4 : TetOrder::t10;
+constexpr std::size_t kManyTets = 60'000;  // quadratic elements of more take minutes and gigabytes
+constexpr double kSafePoisson = 0.4;       // above, linear elements lock
+
+struct Truth {
+  ElasticLaw law;
+  TetOrder order;
+  std::string because;
+};
+
+// Which finite elements: as asked, as the problem's own file says, or by Poisson's ratio and size.
+Truth truth_of(LawChoice law, OrderChoice order, const TissueProblem& problem, const TetMesh& mesh) {
+  Truth t{law == LawChoice::automatic ? problem.law.value_or(ElasticLaw::neo_hooke) : static_cast<ElasticLaw>(static_cast<int>(law) - 1),
+          order == OrderChoice::t4 ? TetOrder::t4 : TetOrder::t10, "asked for"};
+  if (order != OrderChoice::automatic) return t;
+  double poisson = 0;
+  for (const Material& m : problem.materials) poisson = std::max(poisson, m.poisson);
+  if (problem.order) {
+    t.order = *problem.order;
+    t.because = "as in the .inp file";
+    if (t.order == TetOrder::t4 && poisson > kSafePoisson)
+      t.because += "; linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson);
+  } else if (mesh.tets.size() > kManyTets && poisson <= kSafePoisson) {
+    t.order = TetOrder::t4;
+    t.because = std::to_string(mesh.tets.size()) + " tetrahedra, and none locks at a Poisson's ratio of " + format_number(poisson) +
+                ": linear ones";
+  } else {
+    t.because = poisson > kSafePoisson ? "linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson)
+                                       : "linear tetrahedra bend too little";
+  }
+  return t;
+}
+
+std::string_view name_of(TetOrder order) {
+  return order == TetOrder::t4 ? "t4" : "t10";
 }
 
 std::size_t load_named(const TissueProblem& problem, const std::string& name) {
@@ -66,12 +98,12 @@ StageInfo FemStage::info() {
               "elasticity, Saint "
               "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 2e-7 "
               "where that "
-              "has the same law. The problem can be written as an input file for CalculiX or Abaqus.",
+              "has the same law. Reads and writes input files of CalculiX and Abaqus: give one .inp as mesh and as problem.",
           .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it"},
-                     {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"}},
+                     {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"}},
           .outputs = {{"deformed", {DataKind::tets}, "the same mesh under the load"},
                       {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
-                      {"inp", {DataKind::document}, "the problem for CalculiX or Abaqus (linear, stvk)", true}},
+                      {"inp", {DataKind::document}, "the problem for CalculiX or Abaqus (not neo_hooke)", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.3",
                          "J. Bonet, R. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2008"},
           .example = "osteo fem tissue.vtu problem.json deformed.vtu --report-out report.json"};
@@ -81,10 +113,10 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
   const std::size_t n = load_named(problem, p.load);
-  const FemBody body(points_of(mesh), tets_of(mesh), problem.materials, p.law, order_of(p.order));
-  TissueLoad load = problem.loads[n];
-  load.fixed = body.with_middles(load.fixed);
-  EquilibriumSolver solver(body, body.rest(), load.fixed);
+  const Truth elements = truth_of(p.law, p.order, problem, mesh);
+  const FemBody body(points_of(mesh), tets_of(mesh), problem.materials, elements.law, elements.order);
+  const TissueLoad load = body.on_all_points(problem.loads[n]);
+  EquilibriumSolver solver(body, body.rest(), load);
   context.progress(0.1, "equilibrium");
   const Equilibrium r = solver.solve(body, body.rest(), load.forces_n, {p.tolerance, 100, p.load_steps}, context);
   if (!r.converged) throw not_at_rest(r, "let the load grow in more --load-steps, or make it smaller");
@@ -93,10 +125,14 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   total_gradient(body, r.points_mm, g);
   Vec3 reaction{};
   for (const std::uint32_t q : load.fixed) reaction += g[q];
+  for (const Slider& q : load.sliders) {
+    for (std::size_t a = 0; a < 3; ++a) reaction[a] += (q.held >> a & 1) != 0 ? g[q.point][a] : 0;
+  }
   const ordered_json moved = moves({body.rest().data(), corners.size()}, corners);
   const ordered_json j{{"load", problem.load_names[n]},
-                       {"law", EnumNames<ElasticLaw>::values[static_cast<std::size_t>(p.law)]},
-                       {"order", p.order == OrderChoice::t4 ? "t4" : "t10"},
+                       {"law", EnumNames<LawChoice>::values[static_cast<std::size_t>(elements.law) + 1]},
+                       {"order", name_of(elements.order)},
+                       {"order_because", elements.because},
                        {"points", body.point_count()},
                        {"displacement", moved},
                        {"energy_mj", r.energy_mj},
@@ -111,7 +147,7 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   context.report("iterations", static_cast<std::int64_t>(r.iterations));
   context.progress(1);
   Document inp;
-  if (p.law != ElasticLaw::neo_hooke) inp.json = inp_text(body, load);
+  if (elements.law != ElasticLaw::neo_hooke) inp.json = inp_text(body, load);
   return {moved_mesh(mesh, corners), Document{written(j)}, std::move(inp)};
 }
 
@@ -148,10 +184,12 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
     at = comma + 1;
   }
   if (fitted.empty()) fitted.push_back(0);
+  const Truth elements = truth_of(p.law, p.order, problem, mesh);
   const auto solve = [&](TetOrder order, const TissueLoad& load) {
-    const FemBody body(points, tets, problem.materials, p.law, order);
-    EquilibriumSolver solver(body, body.rest(), body.with_middles(load.fixed));
-    Equilibrium r = solver.solve(body, body.rest(), load.forces_n, {1e-10, 100, 1}, context);
+    const FemBody body(points, tets, problem.materials, elements.law, order);
+    const TissueLoad all = body.on_all_points(load);
+    EquilibriumSolver solver(body, body.rest(), all);
+    Equilibrium r = solver.solve(body, body.rest(), all.forces_n, {1e-10, 100, 1}, context);
     if (!r.converged) throw not_at_rest(r, "make the load smaller");
     r.points_mm.resize(points.size());
     return r.points_mm;
@@ -161,9 +199,10 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   std::vector<double> doubt;
   for (std::size_t n = 0; n < problem.loads.size(); ++n) {
     context.progress(0.5 * static_cast<double>(n) / static_cast<double>(problem.loads.size()), "finite elements");
-    truth.push_back(solve(order_of(p.order), problem.loads[n]));
+    truth.push_back(solve(elements.order, problem.loads[n]));
     doubt.push_back(
-        calibration_error(points, solve(p.order == OrderChoice::t4 ? TetOrder::t10 : TetOrder::t4, problem.loads[n]), truth.back()).nrms);
+        calibration_error(points, solve(elements.order == TetOrder::t4 ? TetOrder::t10 : TetOrder::t4, problem.loads[n]), truth.back())
+            .nrms);
   }
   std::vector<CalibrationCase> cases;
   for (const std::size_t n : fitted) cases.push_back({problem.loads[n], truth[n]});
@@ -191,7 +230,7 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   j["loads"] = ordered_json::array();
   TissueModel plain = model;
   plain.scale({1, 1, 0, 1});
-  EquilibriumSolver solver(model, model.rest(), problem.fixed);
+  EquilibriumSolver solver(model, model.rest(), problem.fixed, problem.sliders);
   Tets deformed;
   double unseen = 0;
   for (std::size_t n = 0; n < problem.loads.size(); ++n) {
@@ -247,7 +286,8 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
   options.density_kg_m3 = p.density_kg_m3;
   options.damping_per_s = p.damping_per_s;
   options.least_step_s = p.least_step_ms / 1000;
-  TissueDynamics<double> dynamics(model, problem.fixed, options);  // as quick, and single precision never balances to a thousandth
+  TissueDynamics<double> dynamics(model, problem.fixed, options,
+                                  problem.sliders);  // as quick, and single precision never balances to a thousandth
   dynamics.set_load(problem.loads[n].forces_n);
   const auto steps = static_cast<long>(std::ceil(p.seconds / dynamics.step_s()));
   long done = 0;

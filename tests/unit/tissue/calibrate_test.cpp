@@ -110,7 +110,8 @@ TEST(Calibrate, ErrorMetrics) {
   for (Vec3& x : truth) x += Vec3{0, 0, 0.01 * x.x * x.x};
   EXPECT_NEAR(calibration_error(rest, rest, truth).nrms, 1, 1e-12);
   const double c = std::cos(0.3), s = std::sin(0.3);
-  for (std::size_t i = 0; i < rest.size(); ++i) shape[i] = {c * truth[i].x - s * truth[i].y + 3, s * truth[i].x + c * truth[i].y, truth[i].z - 2};
+  for (std::size_t i = 0; i < rest.size(); ++i)
+    shape[i] = {c * truth[i].x - s * truth[i].y + 3, s * truth[i].x + c * truth[i].y, truth[i].z - 2};
   EXPECT_GT(calibration_error(rest, shape, truth).nrms, 1);
   EXPECT_LT(calibration_error(rest, shape, truth).nrms_free_of_rigid, 1e-12);
 }

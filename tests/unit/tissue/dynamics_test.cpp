@@ -39,7 +39,8 @@ TEST(Dynamics, ForcesAreTheModels) {
     std::vector<double> mass(x.size());
     for (const auto& t : model.tets()) {
       const auto& r = model.rest();
-      for (const std::uint32_t p : t) mass[p] += dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in N s2/mm
+      for (const std::uint32_t p : t)
+        mass[p] += dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 24 * 1e-9;  // 1000 kg/m3 in N s2/mm
     }
     for (std::size_t p = 0; p < x.size(); ++p) {
       const Vec3 f = (y[p] - x[p]) * (mass[p] / (d.step_s() * d.step_s()));
@@ -181,8 +182,10 @@ TEST(Dynamics, CutOffItFallsAndTheRestStays) {
   const auto x = d.positions_mm();
   double free_fall = 0, held = 0;
   for (std::size_t p = 0; p < x.size(); ++p) {
-    if (b.points[p].x > 7) free_fall = std::min(free_fall, x[p].z - b.points[p].z);
-    else held = std::min(held, x[p].z - b.points[p].z);
+    if (b.points[p].x > 7)
+      free_fall = std::min(free_fall, x[p].z - b.points[p].z);
+    else
+      held = std::min(held, x[p].z - b.points[p].z);
   }
   EXPECT_LT(free_fall, -1);
   EXPECT_GT(held, -0.5);

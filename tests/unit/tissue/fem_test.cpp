@@ -1,6 +1,8 @@
 // Finite elements against analytic answers, and against CalculiX where it is installed.
 #include "osteo/tissue/fem.h"
 
+#include "osteo/tissue/problem.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,6 +22,8 @@ namespace {
 using test::block;
 using test::shaken;
 
+constexpr ElasticLaw kLaws[] = {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split};
+
 std::vector<std::uint32_t> where(const std::vector<Vec3>& points, const std::function<bool(Vec3)>& f) {
   std::vector<std::uint32_t> found;
   for (std::uint32_t p = 0; p < points.size(); ++p) {
@@ -30,7 +34,7 @@ std::vector<std::uint32_t> where(const std::vector<Vec3>& points, const std::fun
 
 TEST(Fem, GradientsAndHessiansAreThoseOfTheEnergy) {
   const auto b = block(1, 1, 1, 2.0);
-  for (const ElasticLaw law : {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke}) {
+  for (const ElasticLaw law : kLaws) {
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(b.points, b.tets, {{0.3, 0.4}}, law, order);
       test::expect_exact_derivatives(body, shaken(body.rest(), 0.15, 3));
@@ -49,7 +53,7 @@ TEST(Fem, PatchTest) {
     if (inside(p)) p += Vec3{u(random), u(random), u(random)};
   }
   const auto map = [](Vec3 p) { return p + Vec3{0.01 * p.x + 0.02 * p.y, -0.015 * p.y + 0.005 * p.z, 0.008 * p.z + 0.01 * p.x}; };
-  for (const ElasticLaw law : {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke}) {
+  for (const ElasticLaw law : kLaws) {
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(points, b.tets, {{1.0, 0.3}}, law, order);
       const auto fixed = body.with_middles(where(points, [&](Vec3 p) { return !inside(p); }));
@@ -140,7 +144,7 @@ TEST(Fem, CantileverConverges) {
 TEST(Fem, ARigidMotionCostsNothing) {
   const auto b = block(2, 2, 2, 1.0);
   const double c = std::cos(1.1), s = std::sin(1.1);
-  for (const ElasticLaw law : {ElasticLaw::stvk, ElasticLaw::neo_hooke}) {
+  for (const ElasticLaw law : {ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split}) {
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(b.points, b.tets, {{1, 0.49}}, law, order);
       auto x = body.rest();
@@ -170,6 +174,178 @@ TEST(Fem, ErrorsSayWhat) {
   EXPECT_THROW(static_cast<void>(solver.solve(body, body.rest(), nan)), Error);
 }
 
+// A bar in three planes of symmetry, pulled by a traction on its end: the stretches follow from the law alone, whatever the mesh. The force
+// at a stretch of 1.5 (E 0.1 MPa, nu 0.45), by bisection of the law's own equations here.
+TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
+  const Material m{0.1, 0.45};
+  const double mu = m.shear_mpa(), lambda = m.lambda_mpa(), bulk = m.bulk_mpa(), stretch = 1.5;
+  const auto b = block(2, 2, 3, 1.0);
+  for (const ElasticLaw law : {ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split, ElasticLaw::stvk}) {
+    // First Piola stresses along and across, for a lateral stretch t.
+    const auto stress = [&](double t, double s) {
+      const double j = s * t * t;
+      if (law == ElasticLaw::neo_hooke) {
+        const double l = lambda * std::log(j);
+        return std::pair{(mu * (s * s - 1) + l) / s, (mu * (t * t - 1) + l) / t};
+      }
+      if (law == ElasticLaw::stvk) {
+        const double along = (s * s - 1) / 2, across = (t * t - 1) / 2, trace = along + 2 * across;
+        return std::pair{s * (lambda * trace + 2 * mu * along), t * (lambda * trace + 2 * mu * across)};
+      }
+      const double shape = mu / std::cbrt(j * j), third = (s * s + 2 * t * t) / 3, volume = bulk * (j - 1) * j;
+      return std::pair{(shape * (s * s - third) + volume) / s, (shape * (t * t - third) + volume) / t};
+    };
+    double lo = 0.5, hi = 1;
+    for (int i = 0; i < 100; ++i) {
+      const double t = 0.5 * (lo + hi);
+      (stress(t, stretch).second > 0 ? hi : lo) = t;
+    }
+    const double traction = stress(lo, stretch).first;
+    if (law == ElasticLaw::neo_hooke_split) EXPECT_NEAR(traction, 0.03451610, 1e-8);  // as CalculiX prints it
+    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+      const FemBody body(b.points, b.tets, {m}, law, order);
+      TissueLoad load;
+      for (std::uint32_t p = 0; p < b.points.size(); ++p) {
+        const Vec3 q = b.points[p];
+        const int held = (q.x < 1e-9 ? 1 : 0) | (q.y < 1e-9 ? 2 : 0) | (q.z < 1e-9 ? 4 : 0);
+        if (held == 7) load.fixed.push_back(p);
+        if (held != 0 && held != 7) load.sliders.push_back({p, static_cast<std::uint8_t>(held)});
+      }
+      TetMesh mesh;
+      for (const Vec3& p : b.points) mesh.points_mm.push_back(to_floats(p));
+      for (const auto& t : b.tets) mesh.tets.push_back(t);
+      std::vector<std::uint32_t> point_of;
+      const TriMesh skin = boundary_of(mesh, &point_of);
+      for (const auto& t : skin.triangles) {
+        const std::array<std::uint32_t, 3> face{point_of[t[0]], point_of[t[1]], point_of[t[2]]};
+        if (std::min({b.points[face[0]].z, b.points[face[1]].z, b.points[face[2]].z}) > 2.9) load.add_on_face(face, {0, 0, traction * 0.5});
+      }
+      const TissueLoad all = body.on_all_points(load);
+      Vec3 total{};
+      for (const auto& [p, f] : all.forces_n) total += f;
+      EXPECT_NEAR(total.z, 4 * traction, 1e-12);
+      EquilibriumSolver solver(body, body.rest(), all);
+      const Equilibrium r = solver.solve(body, body.rest(), all.forces_n, {1e-12, 100, 4});
+      ASSERT_TRUE(r.converged) << r.why;
+      for (std::size_t p = 0; p < body.point_count(); ++p) {
+        const Vec3 rest = body.rest()[p];
+        EXPECT_LT(length(r.points_mm[p] - Vec3{rest.x * lo, rest.y * lo, rest.z * stretch}), 1e-9);
+      }
+    }
+  }
+}
+
+// Hexahedra in rows, mapped from the unit cube; sliders and faces by the place they come from.
+struct Mapped {
+  test::Block b;
+  std::vector<Vec3> from;  // in the unit cube
+};
+Mapped mapped(int nx, int ny, int nz, const std::function<Vec3(Vec3)>& map) {
+  Mapped m{block(nx, ny, nz, 1.0), {}};
+  for (Vec3& p : m.b.points) {
+    m.from.push_back({p.x / nx, p.y / ny, p.z / nz});
+    p = map(m.from.back());
+  }
+  return m;
+}
+TissueLoad held(const Mapped& m, const std::function<int(Vec3)>& axes) {
+  TissueLoad load;
+  for (std::uint32_t p = 0; p < m.from.size(); ++p) {
+    const int h = axes(m.from[p]);
+    if (h == 7) load.fixed.push_back(p);
+    if (h != 0 && h != 7) load.sliders.push_back({p, static_cast<std::uint8_t>(h)});
+  }
+  return load;
+}
+// Force over area, as a function of place, on the boundary where `in` is true of all three corners.
+void load_faces(const Mapped& m, const std::function<bool(Vec3)>& in, const std::function<Vec3(Vec3 area_outwards)>& force,
+                TissueLoad& load) {
+  TetMesh mesh;
+  for (const Vec3& p : m.b.points) mesh.points_mm.push_back(to_floats(p));
+  for (const auto& t : m.b.tets) mesh.tets.push_back(t);
+  std::vector<std::uint32_t> point_of;
+  const TriMesh skin = boundary_of(mesh, &point_of);
+  for (const auto& t : skin.triangles) {
+    const std::array<std::uint32_t, 3> face{point_of[t[0]], point_of[t[1]], point_of[t[2]]};
+    if (!in(m.from[face[0]]) || !in(m.from[face[1]]) || !in(m.from[face[2]])) continue;
+    const auto at = [&](std::size_t i) { return m.b.points[face[i]]; };
+    load.add_on_face(face, force(cross(at(1) - at(0), at(2) - at(0)) * 0.5));
+  }
+}
+
+// Cook's membrane, plane stress (R. Cook 1974): 48 wide, its left edge 44 high and held, its right edge 16 high and sheared by 1; E 1, nu
+// 1/3. The middle of the right edge rises by 23.96 (fine meshes of many authors). A thin slab in its plane of symmetry here.
+TEST(Fem, CooksMembrane) {
+  double rise[2][2];
+  for (const int fine : {0, 1}) {
+    const int n = fine == 0 ? 6 : 12;
+    const auto m = mapped(n, n, 1, [](Vec3 u) { return Vec3{48 * u.x, 44 * u.x + (44 - 28 * u.x) * u.y, 0.5 * u.z}; });
+    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+      const FemBody body(m.b.points, m.b.tets, {{1, 1.0 / 3}}, ElasticLaw::linear, order);
+      TissueLoad load = held(m, [](Vec3 u) { return (u.x == 0 ? 3 : 0) | (u.z == 0 ? 4 : 0); });
+      load_faces(
+          m, [](Vec3 u) { return u.x == 1; },
+          [](Vec3 area) {
+            return Vec3{0, length(area) / 16, 0};
+          },
+          load);
+      const TissueLoad all = body.on_all_points(load);
+      EquilibriumSolver solver(body, body.rest(), all);
+      const Equilibrium r = solver.solve(body, body.rest(), all.forces_n);
+      ASSERT_TRUE(r.converged) << r.why;
+      for (std::size_t p = 0; p < m.from.size(); ++p) {
+        if (m.from[p].x == 1 && m.from[p].y == 0.5 && m.from[p].z == 0)
+          rise[fine][order == TetOrder::t10 ? 1 : 0] = r.points_mm[p].y - body.rest()[p].y;
+      }
+    }
+  }
+  std::printf("Cook's membrane, rise: t4 %.3f, %.3f (halved), t10 %.3f, %.3f; 23.96 expected\n", rise[0][0], rise[1][0], rise[0][1],
+              rise[1][1]);
+  EXPECT_NEAR(rise[1][1], 23.96, 0.15);
+  EXPECT_LT(std::abs(rise[1][1] - 23.96), std::abs(rise[0][1] - 23.96));
+  EXPECT_LT(rise[1][0], 23.5);
+}
+
+// A thick tube under pressure inside (G. Lame): u(r) = (1 + nu) p a^2 / (E (b^2 - a^2)) ((1 - 2 nu) r + b^2 / r) in plane strain, a quarter
+// of it here, nearly incompressible too.
+TEST(Fem, LamesTube) {
+  for (const double nu : {0.3, 0.499}) {
+    double error[2][2];
+    for (const int fine : {0, 1}) {
+      const int n = fine == 0 ? 4 : 8;
+      const auto m = mapped(n, 2 * n, 1, [&](Vec3 u) {
+        const double r = 1 + u.x, a = u.y * std::acos(-1.0) / 2;
+        return Vec3{u.y == 1 ? 0 : r * std::cos(a), r * std::sin(a), 1.0 / n * u.z};
+      });
+      for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+        const FemBody body(m.b.points, m.b.tets, {{1, nu}}, ElasticLaw::linear, order);
+        TissueLoad load = held(m, [](Vec3 u) { return 4 | (u.y == 0 ? 2 : 0) | (u.y == 1 ? 1 : 0); });
+        load_faces(
+            m, [](Vec3 u) { return u.x == 0; }, [](Vec3 area) { return area * -0.01; }, load);
+        const TissueLoad all = body.on_all_points(load);
+        EquilibriumSolver solver(body, body.rest(), all);
+        const Equilibrium r = solver.solve(body, body.rest(), all.forces_n);
+        ASSERT_TRUE(r.converged) << r.why;
+        double off = 0, size = 0;
+        for (std::size_t p = 0; p < m.from.size(); ++p) {
+          const Vec3 q = body.rest()[p];
+          const double radius = std::hypot(q.x, q.y), u = (1 + nu) * 0.01 / 3 * ((1 - 2 * nu) * radius + 4 / radius);
+          const Vec3 exact = Vec3{q.x, q.y, 0} * (u / radius), own = r.points_mm[p] - q;
+          off += dot(own - exact, own - exact);
+          size += u * u;
+        }
+        error[fine][order == TetOrder::t10 ? 1 : 0] = std::sqrt(off / size);
+      }
+    }
+    std::printf("Lame's tube, nu %.3f, relative error: t4 %.4f, %.4f (halved), t10 %.5f, %.5f\n", nu, error[0][0], error[1][0], error[0][1],
+                error[1][1]);
+    EXPECT_LT(error[1][1], 0.004);
+    EXPECT_LT(error[1][1], 0.35 * error[0][1]);  // flat sides of the tube: second order
+    EXPECT_LT(error[1][0], error[0][0]);
+    EXPECT_GT(error[1][0], 3 * error[1][1]);
+  }
+}
+
 // Displacements that CalculiX finds for the same file.
 std::vector<Vec3> calculix(const std::string& inp, std::size_t points, const std::string& name) {
   const auto folder = std::filesystem::temp_directory_path() / ("osteo_ccx_" + name);
@@ -196,16 +372,19 @@ TEST(Fem, AgreesWithCalculix) {
     TetOrder order;
     const char* name;
   };
-  for (const Case& c : {Case{ElasticLaw::linear, TetOrder::t4, "C3D4"}, Case{ElasticLaw::linear, TetOrder::t10, "C3D10"},
-                        Case{ElasticLaw::stvk, TetOrder::t4, "C3D4-nlgeom"}}) {
+  for (const Case& c :
+       {Case{ElasticLaw::linear, TetOrder::t4, "C3D4"}, Case{ElasticLaw::linear, TetOrder::t10, "C3D10"},
+        Case{ElasticLaw::stvk, TetOrder::t4, "C3D4-nlgeom"}, Case{ElasticLaw::neo_hooke_split, TetOrder::t10, "C3D10-neo-hooke"}}) {
     std::vector<Material> materials;
     for (std::size_t t = 0; t < b.tets.size(); ++t) materials.push_back(t / 5 % 4 == 0 ? Material{0.4, 0.3} : Material{0.1, 0.45});
     const FemBody body(b.points, b.tets, materials, c.law, c.order);
     TissueLoad load;
-    load.fixed = body.with_middles(where(b.points, [](Vec3 p) { return p.x < 1e-9; }));
+    load.fixed = where(b.points, [](Vec3 p) { return p.x < 1e-9 && p.y < 2.1; });
+    for (const std::uint32_t p : where(b.points, [](Vec3 q) { return q.x < 1e-9 && q.y > 2.1; })) load.sliders.push_back({p, 5});
     const auto end = where(b.points, [](Vec3 p) { return p.x > 11.99; });
     for (const std::uint32_t p : end) load.forces_n.push_back({p, Vec3{0.004, 0.01, -0.006} / static_cast<double>(end.size())});
-    EquilibriumSolver solver(body, body.rest(), load.fixed);
+    load = body.on_all_points(load);
+    EquilibriumSolver solver(body, body.rest(), load);
     const Equilibrium r = solver.solve(body, body.rest(), load.forces_n);
     ASSERT_TRUE(r.converged) << r.why;
     const auto u = calculix(inp_text(body, load), body.point_count(), c.name);

@@ -4,6 +4,7 @@
 
 #include "block.h"
 #include "osteo/base/error.h"
+#include "osteo/io/inp_io.h"
 #include "osteo/tissue/calibrate.h"
 
 namespace osteo {
@@ -65,6 +66,101 @@ TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
     EXPECT_LT(r.after[0].nrms, 0.05);
   }
   EXPECT_THROW(with_log_factors(model, {2, 2, 2}, std::vector<double>(5)), Error);
+}
+
+// Written and read back as .inp: the same body under the same load, forces on faces and sliders too.
+TEST(TissueProblem, GoesThroughAnInpFile) {
+  const TetMesh mesh = mesh_of(test::block(4, 2, 2, 5.0));
+  const TissueProblem p = parse_tissue_problem(R"({"osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
+    "regions": [{"box_mm": [[10, -1, -1], [21, 11, 11]], "young_kpa": 50, "poisson": 0.3}],
+    "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 0.1, 11]]}, {"box_mm": [[-1, -1, -1], [0.1, 11, 11]], "axes": "xz"}],
+    "loads": [{"surfaces": [{"box_mm": [[19.9, 0, 0], [21, 10, 10]], "kpa": -2}, {"box_mm": [[0, 0, 9.9], [20, 10, 11]], "kpa": [0.1, 0, 0]}],
+               "forces": [{"at_mm": [20, 5, 5], "radius_mm": 3, "total_n": [0, 0.01, 0]}]}]})",
+                                               mesh);
+  EXPECT_EQ(p.fixed.size(), 3u);
+  EXPECT_EQ(p.sliders.size(), 9u);
+  Vec3 total{};
+  for (const auto& [point, f] : p.loads[0].forces_n) total += f;
+  EXPECT_NEAR(total.x, 0.002 * 100 + 0.0001 * 200, 1e-9);
+  EXPECT_NEAR(total.y, 0.01, 1e-9);
+  for (const auto& [law, order] :
+       {std::pair{ElasticLaw::linear, TetOrder::t4}, {ElasticLaw::stvk, TetOrder::t10}, {ElasticLaw::neo_hooke_split, TetOrder::t10}}) {
+    const FemBody body(points_of(mesh), tets_of(mesh), p.materials, law, order);
+    const TissueLoad load = body.on_all_points(p.loads[0]);
+    const std::string text = inp_text(body, load);
+    const TetMesh read = parse_inp(text, "x").mesh;
+    ASSERT_EQ(read.tets.size(), mesh.tets.size());
+    const TissueProblem again = parse_tissue_problem(text, read);
+    EXPECT_EQ(again.law, law);
+    EXPECT_EQ(again.order, order);
+    const FemBody other(points_of(read), tets_of(read), again.materials, law, order);
+    const TissueLoad other_load = other.on_all_points(again.loads[0]);
+    EquilibriumSolver a(body, body.rest(), load), b(other, other.rest(), other_load);
+    const Equilibrium ra = a.solve(body, body.rest(), load.forces_n), rb = b.solve(other, other.rest(), other_load.forces_n);
+    ASSERT_TRUE(ra.converged && rb.converged) << ra.why << rb.why;
+    for (std::size_t q = 0; q < mesh.points_mm.size(); ++q) EXPECT_LT(length(ra.points_mm[q] - rb.points_mm[q]), 1e-9);
+  }
+}
+
+TEST(TissueProblem, ForeignInpFiles) {
+  // As another program might write it: sets, GENERATE, several lines an element, a pressure on faces, lower case.
+  const std::string text = R"(*heading
+a tetrahedron, and one on it
+*Node, nset=all
+ 10, 0., 0., 0.
+ 11, 1., 0., 0.
+ 12, 0., 1., 0.
+ 13, 0., 0., 1.
+ 14, 1., 1., 1.
+*Element, type=C3D4, elset=body
+ 5, 10, 11,
+    12, 13
+ 6, 11, 12, 13, 14
+*Nset, nset=base, generate
+ 10, 12, 1
+*Material, name=gel
+*Elastic
+ 0.1, 0.3
+*Solid Section, elset=body, material=gel
+*Boundary
+ base, 1, 3
+*Step, nlgeom
+*Static
+*Dload
+ 6, P3, 0.002
+*Cload
+ 13, 3, -1e-3
+*End Step
+)";
+  const TetMesh mesh = parse_inp(text, "x").mesh;
+  const TissueProblem p = parse_tissue_problem(text, mesh);
+  EXPECT_EQ(p.fixed.size(), 3u);
+  EXPECT_EQ(p.law, ElasticLaw::stvk);
+  ASSERT_EQ(p.loads.size(), 1u);
+  Vec3 total{};
+  for (const auto& [point, f] : p.loads[0].forces_n) total += f;
+  // P3: the face of nodes 2, 4, 3 (12, 14, 13), pressed inwards, away from it: (0, 1, 1) x (0, 0, 1)...
+  const Vec3 a{0, 1, 0}, b{1, 1, 1}, c{0, 0, 1}, area = cross(b - a, c - a) * 0.5;
+  const double side = dot(area, Vec3{1, 0, 0} - a) > 0 ? 1 : -1;
+  const Vec3 expected = area * (0.002 * side) + Vec3{0, 0, -1e-3};
+  EXPECT_LT(length(total - expected), 1e-12);
+  const auto says = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    try {
+      static_cast<void>(parse_tissue_problem(changed, mesh));
+      ADD_FAILURE() << to << " was read";
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
+    }
+  };
+  says("C3D4", "C3D8", "C3D8");
+  says("0.1, 0.3", "0.1, x", "'X' is no number");
+  says("12, 13\n 6", "12, 99\n 6", "no node 99");
+  says("*Solid Section, elset=body", "*Solid Section, elset=bdy", "BDY");
+  says("*Static\n", "*Static\n*Contact\n", "might change the answer");
+  says("base, 1, 3", "base, 1, 3, 0.5", "moved");
+  says("6, P3", "7, P3", "no element 7");
 }
 
 }  // namespace

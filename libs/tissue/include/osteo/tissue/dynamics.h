@@ -31,7 +31,8 @@ template <class Real>
 class TissueDynamics {
  public:
   /// Errors: usage for a density not above 0, or a fixed point that is not there.
-  TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options = {});
+  TissueDynamics(const TissueModel& model, std::span<const std::uint32_t> fixed, const DynamicsOptions& options = {},
+                 std::span<const Slider> sliders = {});
   ~TissueDynamics();
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);

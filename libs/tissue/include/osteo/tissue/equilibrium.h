@@ -1,5 +1,6 @@
 // Where an elastic body comes to rest under a load.
 #pragma once
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,10 +10,26 @@
 
 namespace osteo {
 
-/// Dead loads on points, and points that do not move. Forces in N.
+/// A point that is held along some axes (bit 0: x, 1: y, 2: z) and slides along the others, as in a plane of symmetry.
+struct Slider {
+  std::uint32_t point = 0;
+  std::uint8_t held = 0;
+};
+
+/// Dead loads on the points of a mesh, and what does not move. Forces in N.
 struct TissueLoad {
   std::vector<std::pair<std::uint32_t, Vec3>> forces_n;
   std::vector<std::uint32_t> fixed;
+  std::vector<Slider> sliders;
+  /// Which of the forces really act in the middle of an edge (half of each is in forces_n at either end): what a force spread over
+  /// faces is for quadratic tetrahedra. FemBody::on_all_points() moves them there.
+  struct EdgeForce {
+    std::array<std::uint32_t, 2> edge;
+    Vec3 force_n;
+  };
+  std::vector<EdgeForce> edge_forces_n;
+  /// Spreads a force evenly over a triangle.
+  void add_on_face(const std::array<std::uint32_t, 3>& corners, Vec3 force_n);
 };
 
 struct EquilibriumOptions {
@@ -37,9 +54,11 @@ struct Equilibrium {
 /// topology and a set of fixed points; solves as often as asked. Deterministic.
 class EquilibriumSolver {
  public:
-  /// Errors: usage, when a part of the body has fewer than three fixed points that are not in a line (it could move freely), or an index
-  /// is out of range; `rest` decides that.
-  EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed);
+  /// Errors: usage, when a part of the body could still move as a rigid body (elements of one point hold it too), or an index is out of
+  /// range; `rest` decides that.
+  EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
+                    std::span<const Slider> sliders = {});
+  EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, const TissueLoad& held);
   ~EquilibriumSolver();
 
   /// From `start`, which must have finite energy. `energy` may be another of the same topology than it was made for.

@@ -14,12 +14,14 @@ struct Material {
   double young_mpa = 0.1;
   double poisson = 0.45;
   [[nodiscard]] double shear_mpa() const { return young_mpa / (2 * (1 + poisson)); }
+  [[nodiscard]] double bulk_mpa() const { return young_mpa / (3 * (1 - 2 * poisson)); }
   [[nodiscard]] double lambda_mpa() const { return young_mpa * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
 };
 
 /// linear: small strain. stvk: Saint Venant-Kirchhoff, Green's strain in Hooke's law (what programs mean by large displacement with elastic
-/// constants). neo_hooke: W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2, infinite where J <= 0.
-enum class ElasticLaw : int { linear, stvk, neo_hooke };
+/// constants). neo_hooke: W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2. neo_hooke_split: W = mu/2 (J^(-2/3) tr C - 3) +
+/// K/2 (J - 1)^2, shape apart from volume, as *HYPERELASTIC, NEO HOOKE has it. Both infinite where J <= 0.
+enum class ElasticLaw : int { linear, stvk, neo_hooke, neo_hooke_split };
 /// t4: linear tetrahedra; too stiff in bending, and lock as Poisson's ratio nears a half. t10: quadratic, straight edges at rest, 4 Gauss points.
 enum class TetOrder : int { t4, t10 };
 
@@ -40,6 +42,9 @@ class FemBody final : public Energy {
   [[nodiscard]] std::size_t corner_count() const { return corners_; }
   /// Fixed corners, and of t10 also the points in the middle of edges between two of them.
   [[nodiscard]] std::vector<std::uint32_t> with_middles(std::span<const std::uint32_t> corners) const;
+  /// A load on the mesh's points as one on all of the body's: also held are, of t10, the middles between two corners that are (along the
+  /// axes that both are), and forces that act on edges go there. Of t4 nothing changes.
+  [[nodiscard]] TissueLoad on_all_points(const TissueLoad& load) const;
   /// Tetrahedra that are turned inside out (of t10: at a Gauss point).
   [[nodiscard]] std::size_t inverted(std::span<const Vec3> x) const;
   [[nodiscard]] const std::vector<Material>& materials() const { return materials_; }
@@ -66,9 +71,5 @@ class FemBody final : public Energy {
 /// Points in mm and tetrahedra of a mesh, for both models.
 [[nodiscard]] std::vector<Vec3> points_of(const TetMesh& mesh);
 [[nodiscard]] std::vector<std::array<std::uint32_t, 4>> tets_of(const TetMesh& mesh);
-
-/// The same problem as an input file of CalculiX or Abaqus (*ELEMENT C3D4 or C3D10, *ELASTIC, *CLOAD, with NLGEOM unless linear); neo_hooke
-/// has no counterpart there (theirs splits off the volume). Displacements are printed to the .dat file. Error(usage) for neo_hooke.
-[[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 
 }  // namespace osteo

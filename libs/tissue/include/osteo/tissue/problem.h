@@ -13,19 +13,32 @@ namespace osteo {
 
 /// { "osteotome_tissue": 1, "material": {"young_kpa": 100, "poisson": 0.45},
 ///   "regions": [ {"box_mm": [[0,0,0],[10,10,5]], "young_kpa": 1000, "poisson": 0.3} ],
-///   "fixed": [ {"box_mm": [[-1,-1,-1],[100,100,0.1]]} ],
-///   "loads": [ {"name": "pull", "forces": [ {"at_mm": [5,5,10], "radius_mm": 3, "total_n": [0,0,1]} ]} ] }
+///   "fixed": [ {"box_mm": [[-1,-1,-1],[100,100,0.1]]}, {"box_mm": [[-1,-1,-1],[0.1,100,100]], "axes": "x"} ],
+///   "loads": [ {"name": "pull", "forces": [ {"at_mm": [5,5,10], "radius_mm": 3, "total_n": [0,0,1]} ],
+///                               "surfaces": [ {"box_mm": [[0,0,9.9],[10,10,10.1]], "kpa": 2} ]} ] }
 /// Places are boxes ("box_mm") or balls ("at_mm", "radius_mm"), LPS. A force is the total over the points in its place, shared evenly.
+/// A surface is loaded where the middle of a triangle of the body's boundary lies in its place: "kpa", one number: a pressure inwards;
+/// three: force over area. Both are of the shape at rest. With "axes" points are held along those only, and slide along the others.
 /// Tetrahedra whose middle lies in a region have its material, the last such region's.
+///
+/// Or an input file of Abaqus or CalculiX, with mm, N and MPa, whose mesh `mesh` is (load_tets): *ELASTIC or *HYPERELASTIC, NEO HOOKE by
+/// *SOLID SECTION; *BOUNDARY without movement; each *STEP a load of *CLOAD and *DLOAD (P1 to P4), NLGEOM says which law.
 struct TissueProblem {
   std::vector<Material> materials;   ///< one a tetrahedron, or one for all
   std::vector<std::uint32_t> fixed;  ///< points
+  std::vector<Slider> sliders;
   std::vector<std::string> load_names;
-  std::vector<TissueLoad> loads;  ///< each with `fixed`
+  std::vector<TissueLoad> loads;  ///< each with `fixed` and `sliders`
+  std::optional<ElasticLaw> law;  ///< what an .inp says; JSON leaves it open
+  std::optional<TetOrder> order;
 };
 /// Errors: usage with the place in the text; for places that no point lies in; for a load on fixed points alone.
 /// Without `needs_loads` there may be none.
-[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads = true);
+[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true);
+/// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and
+/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Error(usage) for neo_hooke, which is not known
+/// there.
+[[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 /// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
 [[nodiscard]] TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem,
                                            const std::optional<std::string>& constants_json = std::nullopt);

@@ -9,9 +9,11 @@
 
 namespace osteo {
 
+/// ElasticLaw, and to choose none.
+enum class LawChoice : int { automatic, linear, stvk, neo_hooke, neo_hooke_split };
 template <>
-struct EnumNames<ElasticLaw> {
-  static constexpr std::array<std::string_view, 3> values{"linear", "stvk", "neo_hooke"};
+struct EnumNames<LawChoice> {
+  static constexpr std::array<std::string_view, 5> values{"auto", "linear", "stvk", "neo_hooke", "neo_hooke_split"};
 };
 enum class OrderChoice : int { automatic, t4, t10 };
 template <>
@@ -20,7 +22,7 @@ struct EnumNames<OrderChoice> {
 };
 
 struct FemParams {
-  ElasticLaw law = ElasticLaw::neo_hooke;
+  LawChoice law = LawChoice::automatic;
   OrderChoice order = OrderChoice::automatic;
   std::string load;
   int load_steps = 1;
@@ -29,8 +31,14 @@ struct FemParams {
 struct FemStage {
   using Params = FemParams;
   static void describe(Params& p, auto& visit) {
-    visit({"law", "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains"}, p.law);
-    visit({"order", "t4: linear tetrahedra; t10: quadratic; auto: quadratic, since linear ones bend too little and lock near 0.5"}, p.order);
+    visit({"law",
+           "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains; neo_hooke_split: shape and volume apart, "
+           "as "
+           "CalculiX has it; auto: neo_hooke, or what an .inp says"},
+          p.law);
+    visit(
+        {"order", "t4: linear tetrahedra; t10: quadratic; auto: quadratic, but for large meshes whose Poisson's ratio lets linear ones do"},
+        p.order);
     visit({"load", "name of the load (empty: the first)"}, p.load);
     visit({"load_steps", "equal steps in which the load grows", "", 1, 1000}, p.load_steps);
     visit({"tolerance", "residual force over load", "", 1e-14, 1e-2}, p.tolerance);
@@ -41,7 +49,7 @@ struct FemStage {
 
 struct CalibrateParams {
   std::string fit;
-  ElasticLaw law = ElasticLaw::neo_hooke;
+  LawChoice law = LawChoice::automatic;
   OrderChoice order = OrderChoice::automatic;
   int grid_x = 1, grid_y = 1, grid_z = 1;
   bool shared_grid = true;
@@ -82,7 +90,8 @@ struct SimulateStage {
     visit({"seconds", "of simulated time, at most", "s", 1e-4, 1000}, p.seconds);
     visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
-    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0, 100}, p.least_step_ms);
+    visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0, 100},
+          p.least_step_ms);
     visit({"until_rest", "ends when the forces balance to a thousandth of the load and little moves"}, p.until_rest);
   }
   static StageInfo info();

@@ -1,0 +1,288 @@
+#include "problem_inp.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <map>
+
+#include "osteo/base/error.h"
+#include "osteo/io/inp_io.h"
+
+namespace osteo {
+namespace tissue {
+namespace {
+
+class Reader {
+ public:
+  Reader(std::string_view text, const TetMesh& mesh) : file_(parse_inp(text, "the tissue problem")) {
+    if (file_.mesh.points_mm.size() != mesh.points_mm.size() || file_.mesh.tets.size() != mesh.tets.size())
+      throw Error(
+          ExitCode::usage,
+          "the problem's .inp has " + std::to_string(file_.mesh.tets.size()) + " tetrahedra, the mesh " + std::to_string(mesh.tets.size()),
+          "give the same .inp file as mesh and as problem");
+  }
+
+  TissueProblem run(bool needs_loads) {
+    Material* open = nullptr;
+    bool in_step = false, large = false;
+    const auto held_before = [&] {
+      TissueLoad load;
+      load.fixed = problem_.fixed;
+      load.sliders = problem_.sliders;
+      return load;
+    };
+    for (const InpCard& card : file_.cards) {
+      if (card.name == "MATERIAL") {
+        open = &materials_[option(card, "NAME")];
+        *open = {0, 0};
+      } else if (card.name == "ELASTIC") {
+        if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
+        if (card.options.contains("TYPE") && card.options.at("TYPE") != "ISO" && card.options.at("TYPE") != "ISOTROPIC")
+          throw fail(card, "only isotropic elasticity is read");
+        *open = {number(card, 0, 0), number(card, 0, 1)};
+        law(card, ElasticLaw::linear);
+      } else if (card.name == "HYPERELASTIC") {
+        if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
+        if (!card.options.contains("NEO HOOKE")) throw fail(card, "of hyperelastic laws only NEO HOOKE is read");
+        const double mu = 2 * number(card, 0, 0), d1 = number(card, 0, 1);
+        if (!(d1 > 0)) throw fail(card, "D1 must be above 0: a solid that cannot change its volume is not read");
+        const double bulk = 2 / d1;
+        *open = {9 * bulk * mu / (3 * bulk + mu), (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu))};
+        law(card, ElasticLaw::neo_hooke_split);
+      } else if (card.name == "SOLID SECTION") {
+        sections_.push_back({option(card, "ELSET"), option(card, "MATERIAL"), &card});
+      } else if (card.name == "BOUNDARY") {
+        if (in_step) throw fail(card, "*BOUNDARY inside a *STEP is not read", "put it before the first *STEP");
+        boundary(card);
+      } else if (card.name == "STEP") {
+        in_step = true;
+        large = large || (card.options.contains("NLGEOM") && card.options.at("NLGEOM") != "NO");
+        settle_boundary();
+        problem_.loads.push_back(held_before());
+        problem_.load_names.push_back("step " + std::to_string(problem_.loads.size()));
+      } else if (card.name == "CLOAD" || card.name == "DLOAD") {
+        if (!in_step) throw fail(card, "it stands outside a *STEP");
+        card.name == "CLOAD" ? cload(card, problem_.loads.back()) : dload(card, problem_.loads.back());
+      } else if (card.name != "STATIC" && card.name != "END STEP" && card.name != "DENSITY" && !card.name.ends_with("PRINT") &&
+                 !card.name.ends_with("FILE") && !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" && card.name != "PREPRINT" &&
+                 card.name != "RESTART" && card.name != "ASSEMBLY" && card.name != "END ASSEMBLY") {
+        throw fail(card, "this card is not read, and might change the answer", "docs/tissue.md lists what is");
+      }
+    }
+    settle_boundary();
+    if (needs_loads && problem_.loads.empty()) throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
+    materials();
+    problem_.order = file_.quadratic ? TetOrder::t10 : TetOrder::t4;
+    if (problem_.law == ElasticLaw::linear && large) problem_.law = ElasticLaw::stvk;
+    return std::move(problem_);
+  }
+
+ private:
+  struct Section {
+    std::string set, material;
+    const InpCard* card;
+  };
+
+  [[nodiscard]] static Error fail(const InpCard& card, const std::string& what, const std::string& advice = {}) {
+    return {ExitCode::usage, "the tissue problem, line " + std::to_string(card.line) + ", *" + card.name + ": " + what, advice};
+  }
+  [[nodiscard]] static std::string option(const InpCard& card, const std::string& name) {
+    const auto found = card.options.find(name);
+    if (found == card.options.end()) throw fail(card, name + "= is missing");
+    return found->second;
+  }
+  [[nodiscard]] static double number_of(const InpCard& card, const std::string& field) {
+    double v = 0;
+    const char* const end = field.data() + field.size();
+    const auto [at, problem] = std::from_chars(field.data() + (field.starts_with('+') ? 1 : 0), end, v);
+    if (problem != std::errc() || at != end) throw fail(card, "'" + field + "' is no number");
+    return v;
+  }
+  [[nodiscard]] static double number(const InpCard& card, std::size_t row, std::size_t column) {
+    if (card.rows.size() <= row || card.rows[row].size() <= column) throw fail(card, "it has too few numbers");
+    return number_of(card, card.rows[row][column]);
+  }
+  void law(const InpCard& card, ElasticLaw l) {
+    if (problem_.law && *problem_.law != l) throw fail(card, "materials of different laws are mixed");
+    problem_.law = l;
+  }
+  // Members of a set, or the one number.
+  [[nodiscard]] static std::vector<long> members(const InpCard& card, const std::map<std::string, std::vector<long>>& sets,
+                                                 const std::string& field) {
+    if (const auto s = sets.find(field); s != sets.end()) return s->second;
+    if (field.empty() || field.find_first_not_of("0123456789") != std::string::npos) throw fail(card, "there is no set " + field);
+    return {static_cast<long>(number_of(card, field))};
+  }
+
+  void boundary(const InpCard& card) {
+    for (const auto& row : card.rows) {
+      if (row.size() < 2) throw fail(card, "a line holds less than a node and an axis");
+      const double first = number_of(card, row[1]), last = row.size() > 2 && !row[2].empty() ? number_of(card, row[2]) : first;
+      if (row.size() > 3 && number_of(card, row[3]) != 0) throw fail(card, "points that are moved by it are not read, only held ones");
+      if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
+      for (const long node : members(card, file_.node_sets, row[0])) {
+        std::uint8_t& axes = held_[node];
+        for (int a = static_cast<int>(first); a <= static_cast<int>(last); ++a) axes = static_cast<std::uint8_t>(axes | 1 << (a - 1));
+        last_boundary_ = &card;
+      }
+    }
+  }
+  // Nodes in the middle of edges follow from their ends.
+  void settle_boundary() {
+    if (settled_) return;
+    settled_ = true;
+    std::map<std::uint32_t, std::uint8_t> of_point;
+    for (const auto& [node, axes] : held_) {
+      if (const auto p = file_.point_of.find(node); p != file_.point_of.end()) of_point[p->second] = axes;
+    }
+    for (const auto& [node, axes] : held_) {
+      if (file_.point_of.contains(node)) continue;
+      const auto middle = file_.middle_of.find(node);
+      if (middle == file_.middle_of.end()) continue;  // a node that no element has
+      const auto both = static_cast<std::uint8_t>(of_point[middle->second[0]] & of_point[middle->second[1]]);
+      if (both != axes)
+        throw fail(*last_boundary_, "node " + std::to_string(node) + " in the middle of an edge is held otherwise than both its ends");
+    }
+    for (const auto& [p, axes] : of_point) {
+      if (axes == 7) problem_.fixed.push_back(p);
+      if (axes != 0 && axes != 7) problem_.sliders.push_back({p, axes});
+    }
+  }
+  void cload(const InpCard& card, TissueLoad& load) {
+    for (const auto& row : card.rows) {
+      if (row.size() < 3) throw fail(card, "a line holds less than a node, an axis and a force");
+      const double axis = number_of(card, row[1]);
+      if (axis != 1 && axis != 2 && axis != 3) throw fail(card, "axes go from 1 to 3, not " + row[1]);
+      Vec3 force{};
+      force[static_cast<std::size_t>(axis) - 1] = number_of(card, row[2]);
+      for (const long node : members(card, file_.node_sets, row[0])) {
+        if (const auto p = file_.point_of.find(node); p != file_.point_of.end()) {
+          load.forces_n.push_back({p->second, force});
+        } else if (const auto m = file_.middle_of.find(node); m != file_.middle_of.end()) {
+          load.edge_forces_n.push_back({m->second, force});
+          for (const std::uint32_t end : m->second) load.forces_n.push_back({end, force * 0.5});
+        } else {
+          throw fail(card, "no element has node " + std::to_string(node));
+        }
+      }
+    }
+  }
+  void dload(const InpCard& card, TissueLoad& load) {
+    constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+    for (const auto& row : card.rows) {
+      if (row.size() < 3 || row[1].size() != 2 || row[1][0] != 'P' || row[1][1] < '1' || row[1][1] > '4')
+        throw fail(card, "only pressures P1 to P4 on faces are read");
+      const double pressure = number_of(card, row[2]);
+      for (const long element : members(card, file_.element_sets, row[0])) {
+        const auto found = file_.corners_of.find(element);
+        if (found == file_.corners_of.end()) throw fail(card, "there is no element " + std::to_string(element));
+        std::array<std::uint32_t, 3> face{};
+        const auto& own = kFaces[row[1][1] - '1'];
+        for (std::size_t i = 0; i < 3; ++i) face[i] = found->second[own[i]];
+        const auto at = [&](std::uint32_t p) { return from_floats(file_.mesh.points_mm[p]); };
+        Vec3 area = cross(at(face[1]) - at(face[0]), at(face[2]) - at(face[0])) * 0.5, middle{};
+        for (const std::uint32_t p : found->second) middle += at(p) / 4;
+        if (dot(area, middle - at(face[0])) < 0) area = area * -1;  // inwards
+        load.add_on_face(face, area * pressure);
+      }
+    }
+  }
+  void materials() {
+    if (sections_.empty()) throw Error(ExitCode::usage, "the tissue problem, materials: there is no *SOLID SECTION");
+    problem_.materials.assign(file_.mesh.tets.size(), {0, 0});
+    for (const Section& s : sections_) {
+      const auto m = materials_.find(s.material);
+      if (m == materials_.end() || !(m->second.young_mpa > 0)) throw fail(*s.card, "there is no elastic *MATERIAL " + s.material);
+      const auto set = file_.element_sets.find(s.set);
+      if (set == file_.element_sets.end()) throw fail(*s.card, "there is no set " + s.set);
+      for (const long e : set->second) {
+        const auto t = file_.tet_of.find(e);
+        if (t == file_.tet_of.end()) throw fail(*s.card, "there is no element " + std::to_string(e));
+        problem_.materials[t->second] = m->second;
+      }
+    }
+    for (std::size_t t = 0; t < problem_.materials.size(); ++t) {
+      if (!(problem_.materials[t].young_mpa > 0))
+        throw Error(ExitCode::usage, "the tissue problem, materials: tetrahedron " + std::to_string(t) + " has none");
+    }
+    const auto same = [&](const Material& m) {
+      return m.young_mpa == problem_.materials[0].young_mpa && m.poisson == problem_.materials[0].poisson;
+    };
+    if (std::all_of(problem_.materials.begin(), problem_.materials.end(), same)) problem_.materials.resize(1);
+  }
+
+  InpFile file_;
+  TissueProblem problem_;
+  std::map<std::string, Material> materials_;
+  std::vector<Section> sections_;
+  std::map<long, std::uint8_t> held_;
+  const InpCard* last_boundary_ = nullptr;
+  bool settled_ = false;
+};
+
+}  // namespace
+
+TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads) {
+  return Reader(text, mesh).run(needs_loads);
+}
+
+}  // namespace tissue
+
+std::string inp_text(const FemBody& body, const TissueLoad& load) {
+  if (body.law() == ElasticLaw::neo_hooke)
+    throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
+  std::string t = "** written by osteotome: mm, N, MPa\n*NODE, NSET=ALL\n";
+  char line[160];
+  for (std::size_t p = 0; p < body.point_count(); ++p) {
+    const Vec3 x = body.rest()[p];
+    std::snprintf(line, sizeof line, "%zu, %.15g, %.15g, %.15g\n", p + 1, x.x, x.y, x.z);
+    t += line;
+  }
+  t += body.order() == TetOrder::t4 ? "*ELEMENT, TYPE=C3D4, ELSET=EALL\n" : "*ELEMENT, TYPE=C3D10, ELSET=EALL\n";
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    t += std::to_string(e + 1);
+    for (const std::uint32_t n : body.nodes(e)) t += ", " + std::to_string(n + 1);
+    t += "\n";
+  }
+  // Equal materials share a set.
+  std::map<std::pair<double, double>, std::vector<std::size_t>> sets;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    const Material& m = body.materials()[body.materials().size() == 1 ? 0 : e];
+    sets[{m.young_mpa, m.poisson}].push_back(e + 1);
+  }
+  int number = 0;
+  for (const auto& [material, elements] : sets) {
+    ++number;
+    const Material m{material.first, material.second};
+    const bool split = body.law() == ElasticLaw::neo_hooke_split;
+    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%.15g, %.15g\n*ELSET, ELSET=E%d\n", number,
+                  split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC", split ? m.shear_mpa() / 2 : m.young_mpa,
+                  split ? 2 / m.bulk_mpa() : m.poisson, number);
+    t += line;
+    for (std::size_t i = 0; i < elements.size(); ++i)
+      t += std::to_string(elements[i]) + (i % 12 == 11 || i + 1 == elements.size() ? "\n" : ", ");
+    std::snprintf(line, sizeof line, "*SOLID SECTION, ELSET=E%d, MATERIAL=M%d\n", number, number);
+    t += line;
+  }
+  t += "*BOUNDARY\n";
+  for (const std::uint32_t p : load.fixed) t += std::to_string(p + 1) + ", 1, 3\n";
+  for (const Slider& s : load.sliders) {
+    for (int a = 0; a < 3; ++a) {
+      if ((s.held >> a & 1) != 0) t += std::to_string(s.point + 1) + ", " + std::to_string(a + 1) + "\n";
+    }
+  }
+  t += body.law() == ElasticLaw::linear ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n1, 1\n";
+  t += "*CLOAD\n";
+  std::map<std::uint32_t, Vec3> forces;  // some points have several, which a later line would replace
+  for (const auto& [p, f] : load.forces_n) forces[p] += f;
+  for (const auto& [p, f] : forces) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (f[a] == 0) continue;
+      std::snprintf(line, sizeof line, "%u, %zu, %.15g\n", p + 1, a + 1, f[a]);
+      t += line;
+    }
+  }
+  return t + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n";
+}
+
+}  // namespace osteo
