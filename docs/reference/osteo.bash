@@ -15,10 +15,11 @@ _osteo() {
     "voxelize --margin") COMPREPLY=($(compgen -W "exact thesis " -- "$cur")); return ;;
     "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
     "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
-    "fem --law") COMPREPLY=($(compgen -W "linear stvk neo_hooke " -- "$cur")); return ;;
+    "fem --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split " -- "$cur")); return ;;
     "fem --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
-    "calibrate --law") COMPREPLY=($(compgen -W "linear stvk neo_hooke " -- "$cur")); return ;;
+    "calibrate --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split " -- "$cur")); return ;;
     "calibrate --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
+    "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
@@ -47,8 +48,8 @@ _osteo() {
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
     fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out" ;;
-    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --pull --starts --iterations --deformed-out" ;;
-    simulate) flags="$flags --xml --describe --load --seconds --density-kg-m3 --damping-per-s --least-step-ms --until-rest --constants --report-out" ;;
+    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --deformed-out --map-out --course-out" ;;
+    simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
     pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;

@@ -4,6 +4,7 @@
 #include <vtkCellType.h>
 #include <vtkFloatArray.h>
 #include <vtkNew.h>
+#include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridReader.h>
@@ -194,6 +195,11 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
     }
     mesh.tets.push_back(t);
   }
+  if (vtkDataArray* const values = grid->GetPointData()->GetScalars();
+      values != nullptr && values->GetNumberOfComponents() == 1 && values->GetName() != nullptr) {
+    mesh.values_name = values->GetName();
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) mesh.values.push_back(static_cast<float>(values->GetComponent(i, 0)));
+  }
   turn_round(mesh);
   return mesh;
 }
@@ -214,6 +220,13 @@ vtkSmartPointer<vtkUnstructuredGrid> to_vtk(const TetMesh& mesh) {
   auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
   grid->SetPoints(points);
   grid->SetCells(VTK_TETRA, cells);
+  if (!mesh.values.empty()) {
+    vtkNew<vtkFloatArray> values;
+    values->SetName(mesh.values_name.c_str());
+    values->SetNumberOfTuples(static_cast<vtkIdType>(mesh.values.size()));
+    std::copy(mesh.values.begin(), mesh.values.end(), values->GetPointer(0));
+    grid->GetPointData()->SetScalars(values);
+  }
   return grid;
 }
 

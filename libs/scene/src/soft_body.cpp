@@ -44,7 +44,7 @@ SoftBody::~SoftBody() = default;
 
 std::optional<SceneAction> SoftBody::update(Vec3 tool_mm, double radius_mm) {
   Impl& m = *impl_;
-  m.dynamics.set_tool(BallTool{tool_mm, radius_mm, kToolStiffness});
+  m.dynamics.set_tool({std::make_shared<BallShape>(tool_mm, radius_mm), kToolStiffness});
   const Vec3 force = m.dynamics.step(m.steps);
   const double size = length(force);
   const bool pushes = size > 1e-4;

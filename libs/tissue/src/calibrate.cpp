@@ -14,6 +14,8 @@
 namespace osteo {
 namespace {
 
+constexpr double kBorder = 0.3;  // log: differences beyond are taken for borders
+
 // Which grid points a constraint lies between, and how much of each.
 struct Share {
   std::array<std::uint32_t, 8> at{};
@@ -69,6 +71,10 @@ std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& gr
 
 #ifdef OSTEO_WITH_CERES
 
+// Logarithms of the classes' factors (axis edges, diagonals, faces, volumes). Faces begin small: the closed form has none. The others lean
+// on edges, and on faces.
+constexpr std::array<double, kTissueClasses> kStarts[3] = {{0, 0, -2, 0}, {0.7, 0.7, -2, 0}, {-0.7, -0.7, 3, -0.7}};
+
 class Fit {
  public:
   Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
@@ -82,27 +88,67 @@ class Fit {
     for (const CalibrationCase& c : cases) {
       if (held(c.load) != held(cases.front().load)) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
       if (c.truth_mm.size() != model.point_count())
-        throw Error(ExitCode::usage, "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
+        throw Error(ExitCode::usage,
+                    "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
       double sum = 0;
       for (std::size_t p = 0; p < c.truth_mm.size(); ++p) sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
-      if (!(sum > 0) || !std::isfinite(sum)) throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
-      truth_rms_.push_back(std::sqrt(sum / static_cast<double>(c.truth_mm.size())));
+      if (!(sum > 0) || !std::isfinite(sum))
+        throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
+      const double rms = std::sqrt(sum / static_cast<double>(c.truth_mm.size()));
+      scale_.push_back(1 / (rms * std::sqrt(static_cast<double>(c.truth_mm.size() * cases.size()))));
       shape_.push_back(model.rest());
     }
     lay_grid();
+    find_level();
   }
 
   [[nodiscard]] int parameters() const { return static_cast<int>(used_.size()); }
-  [[nodiscard]] int residuals() const { return static_cast<int>(3 * model_.point_count() * cases_.size()) + parameters(); }
-  [[nodiscard]] double seed(int parameter, int start) const {
-    // Faces begin small: the closed form has none. Other starts lean on edges or on faces.
-    if (of_map(parameter)) return 0;
-    const TissueClass kind = kind_of(parameter);
-    const double face = start == 2 ? 3 : -2;
-    return kind == TissueClass::face ? face : start == 1 && kind != TissueClass::volume ? 0.7 : start == 2 ? -0.7 : 0;
+  [[nodiscard]] int residuals() const {
+    return static_cast<int>(3 * model_.point_count() * cases_.size()) + parameters() + static_cast<int>(neighbours_.size());
+  }
+  // Where a start begins: logarithms for the classes, beside the level of a map.
+  [[nodiscard]] double seed(int parameter, const std::array<double, kTissueClasses>& classes) const {
+    return of_map(parameter) ? level_ : classes[static_cast<std::size_t>(kind_of(parameter))];
+  }
+  [[nodiscard]] double cost(const std::vector<double>& logs) {
+    std::vector<double> r(static_cast<std::size_t>(residuals()));
+    if (!evaluate(logs.data(), r.data(), nullptr)) return 1e300;
+    double sum = 0;
+    for (const double v : r) sum += 0.5 * v * v;
+    return sum;
   }
   [[nodiscard]] double pull_goal(int parameter) const {
-    return !of_map(parameter) && kind_of(parameter) == TissueClass::face ? -2 : 0;
+    return of_map(parameter) ? level_ : kStarts[0][static_cast<std::size_t>(kind_of(parameter))];
+  }
+  // Factors of a map and those of the classes are pulled as two families, or many points of a map would leave the classes free.
+  [[nodiscard]] double pull_of(int parameter) const {
+    const double family = !options_.shared_grid || nodes_ == 1 ? parameters()
+                          : of_map(parameter)                  ? parameters() - static_cast<int>(kTissueClasses)
+                                                               : kTissueClasses;
+    return options_.pull / std::sqrt(family);
+  }
+  // A map starts from, and is pulled towards, the one factor with which the closed form moves as far as the truth.
+  void find_level() {
+    if (nodes_ == 1 || !options_.shared_grid) return;
+    for (int round = 0; round < 3; ++round) {
+      model_.scale({std::exp(level_), std::exp(level_), 0, std::exp(level_)});
+      double own = 0, both = 0;
+      for (std::size_t n = 0; n < cases_.size(); ++n) {
+        const Equilibrium at = solver_.solve(model_, shape_[n], cases_[n].load.forces_n, options_.equilibrium, context_);
+        ++result.solves;
+        if (!at.converged) return;
+        shape_[n] = at.points_mm;
+        for (std::size_t p = 0; p < at.points_mm.size(); ++p) {
+          const Vec3 u = (at.points_mm[p] - model_.rest()[p]) * scale_[n], t = (cases_[n].truth_mm[p] - model_.rest()[p]) * scale_[n];
+          own += dot(u, u);
+          both += dot(u, t);
+        }
+      }
+      if (!(both > 0)) return;
+      const double step = std::clamp(std::log(own / both), -2.0, 2.0);
+      level_ = std::clamp(level_ + step, options_.least_log, options_.most_log);
+      if (std::abs(step) < 0.05) return;
+    }
   }
 
   void set(const double* logs) {
@@ -134,18 +180,30 @@ class Fit {
       } else {
         shape_[n] = at.points_mm;
       }
-      const double scale = 1 / (truth_rms_[n] * std::sqrt(static_cast<double>(points * cases_.size())));
       for (std::size_t p = 0; p < points; ++p)
-        for (std::size_t a = 0; a < 3; ++a) *out++ = (shape_[n][p][a] - cases_[n].truth_mm[p][a]) * scale;
-      if (jacobian_rows != nullptr) differentiate(n, scale, *jacobian_rows, 3 * points * n);
+        for (std::size_t a = 0; a < 3; ++a) *out++ = (shape_[n][p][a] - cases_[n].truth_mm[p][a]) * scale_[n];
+      if (jacobian_rows != nullptr) differentiate(n, *jacobian_rows, 3 * points * n);
     }
     for (std::size_t i = 0; i < parameters; ++i) {
-      const double weight = options_.pull / std::sqrt(static_cast<double>(parameters));
+      const double weight = pull_of(static_cast<int>(i));
       *out++ = weight * (logs[i] - pull_goal(static_cast<int>(i)));
       if (jacobian_rows == nullptr) continue;
       double* const row = *jacobian_rows + (3 * points * cases_.size() + i) * parameters;
       std::fill(row, row + parameters, 0.0);
       row[i] = weight;
+    }
+    for (std::size_t n = 0; n < neighbours_.size(); ++n) {
+      const auto [i, j] = neighbours_[n];
+      const double weight = options_.smooth / std::sqrt(static_cast<double>(neighbours_.size()));
+      // Its square is that of a pseudo-Huber loss: d^2 for small differences, 2 kBorder |d| for large ones.
+      const double d = (logs[i] - logs[j]) / kBorder, root = std::sqrt(1 + d * d), value = d * std::sqrt(2 / (root + 1));
+      *out++ = weight * kBorder * value;
+      if (jacobian_rows == nullptr) continue;
+      double* const row = *jacobian_rows + (3 * points * cases_.size() + parameters + n) * parameters;
+      std::fill(row, row + parameters, 0.0);
+      const double slope = weight * (d != 0 ? d / (root * value) : 1);
+      row[i] = slope;
+      row[j] = -slope;
     }
     return true;
   }
@@ -189,7 +247,8 @@ class Fit {
       for (std::size_t n = 0; n < 8; ++n) {
         const std::size_t at = share_[c].at[n];
         // A map of one point is the classes' own factors.
-        if (share_[c].weight[n] > 1e-3 && !(options_.shared_grid && nodes_ == 1)) near[options_.shared_grid ? at : at * kTissueClasses + kind] = true;
+        if (share_[c].weight[n] > 1e-3 && !(options_.shared_grid && nodes_ == 1))
+          near[options_.shared_grid ? at : at * kTissueClasses + kind] = true;
       }
       if (options_.shared_grid) near[nodes_ + kind] = true;
     }
@@ -199,10 +258,21 @@ class Fit {
       parameter_of_[i] = static_cast<std::uint32_t>(used_.size());
       used_.push_back(i);
     }
+    if (options_.smooth <= 0 || nodes_ == 1 || !options_.shared_grid) return;
+    std::size_t stride = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto many = static_cast<std::size_t>(options_.grid[a]);
+      for (std::size_t p = 0; p < nodes_; ++p) {
+        if (p / stride % many + 1 == many) continue;
+        const std::uint32_t i = parameter_of_[p], j = parameter_of_[p + stride];
+        if (i != kNone && j != kNone) neighbours_.push_back({i, j});
+      }
+      stride *= many;
+    }
   }
 
   // H du/dlog_j = - sum over constraints of (share of j) * gradient of its energy, since dk/dlog = k.
-  void differentiate(std::size_t n, double scale, double* jacobian, std::size_t first_row) {
+  void differentiate(std::size_t n, double* jacobian, std::size_t first_row) {
     ++result.jacobians;
     const std::size_t points = model_.point_count(), parameters = used_.size();
     std::vector<std::vector<Vec3>> right(parameters, std::vector<Vec3>(points));
@@ -220,7 +290,7 @@ class Fit {
     for (std::size_t j = 0; j < parameters; ++j) {
       solver_.back_solve(right[j], du);
       for (std::size_t p = 0; p < points; ++p)
-        for (std::size_t a = 0; a < 3; ++a) jacobian[(first_row + 3 * p + a) * parameters + j] = du[p][a] * scale;
+        for (std::size_t a = 0; a < 3; ++a) jacobian[(first_row + 3 * p + a) * parameters + j] = du[p][a] * scale_[n];
     }
   }
 
@@ -229,12 +299,14 @@ class Fit {
   CalibrateOptions options_;
   const Context& context_;
   EquilibriumSolver solver_;
-  std::vector<double> truth_rms_;
-  std::vector<std::vector<Vec3>> shape_;  // where each case came to rest last
+  std::vector<double> scale_;                             // of each case: 1 / its size
+  std::vector<std::array<std::uint32_t, 2>> neighbours_;  // parameters of the map that lie beside each other
+  std::vector<std::vector<Vec3>> shape_;                  // where each case came to rest last
   std::vector<Share> share_;
   static constexpr std::uint32_t kNone = 0xffffffffU;
   std::vector<std::uint32_t> used_, parameter_of_;  // parameter -> number, and back
   std::size_t nodes_ = 1;
+  double level_ = 0;
 };
 
 class Cost final : public ceres::CostFunction {
@@ -255,15 +327,20 @@ class Cost final : public ceres::CostFunction {
 
 class Watch final : public ceres::IterationCallback {
  public:
-  Watch(std::vector<double>& cost, const Context& context) : cost_(cost), context_(context) {}
+  Watch(const std::vector<double>& logs, const Context& context) : logs_(logs), context_(context) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
-    if (s.step_is_successful) cost_.push_back(s.cost);
+    if (s.step_is_successful || s.iteration == 0) {
+      cost.push_back(s.cost);
+      course.push_back(logs_);
+    }
     context_.progress(std::min(0.95, 0.05 * s.iteration), "calibrating");
     return ceres::SOLVER_CONTINUE;
   }
+  std::vector<double> cost;
+  std::vector<std::vector<double>> course;
 
  private:
-  std::vector<double>& cost_;
+  const std::vector<double>& logs_;
   const Context& context_;
 };
 
@@ -293,9 +370,19 @@ CalibrationError calibration_error(std::span<const Vec3> rest, std::span<const V
   return {std::sqrt(off / moved), std::sqrt(left / moved), std::sqrt(off / n), std::sqrt(moved / n)};
 }
 
+double force_error(std::span<const Vec3> rest, std::span<const Vec3> shape, std::span<const Vec3> truth, const TissueLoad& load) {
+  double own = 0, true_work = 0;
+  for (const auto& [p, f] : load.forces_n) {
+    own += dot(f, shape[p] - rest[p]);
+    true_work += dot(f, truth[p] - rest[p]);
+  }
+  return own != 0 ? true_work / own - 1 : 0;
+}
+
 TissueModel with_log_factors(const TissueModel& model, const std::array<int, 3>& grid, std::span<const double> log_factors) {
   if (log_factors.size() != grid_points(grid) * kTissueClasses)
-    throw Error(ExitCode::usage, std::to_string(log_factors.size()) + " factors do not fit a grid of " + std::to_string(grid_points(grid)) + " points");
+    throw Error(ExitCode::usage,
+                std::to_string(log_factors.size()) + " factors do not fit a grid of " + std::to_string(grid_points(grid)) + " points");
   TissueModel scaled = model;
   const std::vector<Share> share = shares(model, grid);
   std::vector<double> factors(share.size());
@@ -346,20 +433,40 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
   std::vector<double> best;
   double best_cost = 1e300;
   ceres::Solver::Summary best_summary;
-  for (int start = 0; start < std::max(1, options.starts); ++start) {
+  std::vector<std::array<double, kTissueClasses>> starts(kStarts, kStarts + std::clamp(options.starts, 1, 3));
+  const auto logs_of = [&](const std::array<double, kTissueClasses>& classes) {
     std::vector<double> logs(n);
-    for (std::size_t i = 0; i < n; ++i) logs[i] = fit.seed(static_cast<int>(i), start);
+    for (std::size_t i = 0; i < n; ++i) logs[i] = fit.seed(static_cast<int>(i), classes);
+    return logs;
+  };
+  double best_sample = 1e300;
+  for (int k = 1; k <= options.samples; ++k) {
+    std::array<double, kTissueClasses> classes{};
+    constexpr int kPrimes[kTissueClasses] = {2, 3, 5, 7};
+    for (std::size_t c = 0; c < kTissueClasses; ++c) {
+      double share = 0, digit = 1;
+      for (int i = k; i > 0; i /= kPrimes[c]) share += (digit /= kPrimes[c]) * (i % kPrimes[c]);
+      classes[c] = kStarts[0][c] + 4 * share - 2;
+    }
+    if (const double cost = fit.cost(logs_of(classes)); cost < best_sample) {
+      if (best_sample < 1e300) starts.pop_back();
+      best_sample = cost;
+      starts.push_back(classes);
+    }
+  }
+  for (const auto& start : starts) {
+    std::vector<double> logs = logs_of(start);
     ceres::Problem problem;
     problem.AddResidualBlock(new Cost(fit), nullptr, logs.data());
     for (std::size_t i = 0; i < n; ++i) {
       problem.SetParameterLowerBound(logs.data(), static_cast<int>(i), options.least_log);
       problem.SetParameterUpperBound(logs.data(), static_cast<int>(i), options.most_log);
     }
-    std::vector<double> cost;
-    Watch watch(cost, context);
+    Watch watch(logs, context);
     ceres::Solver::Options o;
     o.linear_solver_type = ceres::DENSE_QR;
-    // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows better.
+    // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows
+    // better.
     o.trust_region_strategy_type = n > 8 ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
     o.max_num_iterations = options.iterations;
     o.function_tolerance = options.tolerance;
@@ -367,13 +474,15 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
     o.num_threads = 1;
     o.logging_type = ceres::SILENT;
     o.callbacks.push_back(&watch);
+    o.update_state_every_iteration = true;
     ceres::Solver::Summary summary;
     ceres::Solve(o, &problem, &summary);
     if (summary.IsSolutionUsable() && summary.final_cost < best_cost) {
       best_cost = summary.final_cost;
       best = logs;
       best_summary = summary;
-      result.cost = cost;
+      result.cost = watch.cost;
+      result.course = watch.course;
     }
   }
   if (best.empty()) {
@@ -390,7 +499,7 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
   for (std::size_t c = 0; c < cases.size(); ++c)
     result.after.push_back(calibration_error(model.rest(), fit.shapes()[c], cases[c].truth_mm));
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(
-      jacobian.data(), static_cast<Eigen::Index>(residuals.size() - n), static_cast<Eigen::Index>(n));
+      jacobian.data(), static_cast<Eigen::Index>(3 * model.point_count() * cases.size()), static_cast<Eigen::Index>(n));
   const Eigen::MatrixXd information = j.transpose() * j;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(information, Eigen::ComputeFullU | Eigen::ComputeFullV);
   // Variance of the residuals for 1 % of the truth's RMS in each coordinate.

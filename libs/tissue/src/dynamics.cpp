@@ -6,10 +6,14 @@
 #include <string_view>
 #include <type_traits>
 
+#include "body_parts.h"
 #include "dynamics_kernel.h"
 #include "osteo/base/error.h"
 
 namespace osteo {
+
+using namespace tissue;
+
 namespace {
 
 enum class Isa { base, avx2, avx512 };
@@ -53,9 +57,9 @@ tissue::ForceFunction<Real> force_function() {
   }
 }
 
-constexpr double kTonnePerKg = 1e-3;  // N s2 / mm
 // Stretched or sheared, edges are stiffer against their length than at rest by their strain: so much is allowed for.
 constexpr double kStretchMargin = 1.25;
+constexpr std::uint64_t kObstacleSteps = 10;
 
 }  // namespace
 
@@ -77,7 +81,17 @@ struct TissueDynamics<Real>::Impl {
   std::vector<std::uint32_t> edge, face, voxel[2], tet;
   std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
   tissue::Arrays<Real> arrays;
-  std::optional<BallTool> tool;
+  RigidContact tool, obstacle;
+  std::vector<std::uint32_t> surface;  // points of the body's boundary
+  std::vector<double> allowed;         // of each of them: how deep it lies in the obstacle at rest, below 0
+  struct Plane {
+    std::uint32_t point;
+    Vec3 normal;
+    double offset;  // pushes where normal . x < offset
+  };
+  std::vector<Plane> planes;
+  double margin = 0;  // nearer to the obstacle than this a point gets a plane
+  std::uint64_t steps = 0;
   double load_size = 0;
   int met = 0;
   Counts counts;
@@ -86,6 +100,9 @@ struct TissueDynamics<Real>::Impl {
   void lay_out();
   double certify();
   Vec3 forces();
+  // Forces of contact with shape: `deep` above 0, pushed along `out`; returns what acts on the point.
+  Vec3 push(std::uint32_t p, double stiffness, double deep, Vec3 out);
+  void find_planes();
 };
 
 template <class Real>
@@ -184,15 +201,12 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
       throw Error(ExitCode::usage, "point " + std::to_string(s.point) + " is to slide, but there are only " + std::to_string(n));
   }
   m.sliders.assign(sliders.begin(), sliders.end());
-  m.mass.assign(n, 0);
-  for (const auto& t : model.tets()) {
-    const auto& r = model.rest();
-    const double volume = dot(r[t[1]] - r[t[0]], cross(r[t[2]] - r[t[0]], r[t[3]] - r[t[0]])) / 6;
-    for (const std::uint32_t p : t) m.mass[p] += volume * 1e-9 * options.density_kg_m3 * kTonnePerKg / 4;
-  }
+  m.mass = masses(model, options.density_kg_m3);
   for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz}) v->assign(n, 0);
   for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
   m.lay_out();
+  m.surface = points_of_boundary(model);
+  for (const auto& t : model.tets()) m.margin = std::max(m.margin, 0.25 * length(model.rest()[t[1]] - model.rest()[t[0]]));
   m.dt = m.certify();
   m.inverse_mass.assign(n, 0);
   for (std::size_t p = 0; p < n; ++p) {
@@ -221,8 +235,19 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
 }
 
 template <class Real>
-void TissueDynamics<Real>::set_tool(const std::optional<BallTool>& tool) {
-  impl_->tool = tool;
+void TissueDynamics<Real>::set_tool(RigidContact tool) {
+  impl_->tool = std::move(tool);
+}
+
+template <class Real>
+void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
+  Impl& m = *impl_;
+  m.obstacle = std::move(obstacle);
+  m.planes.clear();
+  m.allowed.clear();
+  m.steps = 0;
+  if (!m.obstacle.shape) return;
+  m.allowed = depths_at_rest(*m.obstacle.shape, m.model.rest(), m.surface);
 }
 
 template <class Real>
@@ -243,6 +268,31 @@ void TissueDynamics<Real>::remove_constraints(std::span<const std::uint32_t> con
 }
 
 template <class Real>
+Vec3 TissueDynamics<Real>::Impl::push(std::uint32_t p, double stiffness, double deep, Vec3 out) {
+  // What the certified step leaves room for: with it omega dt stays below 2 in all.
+  const double most = 0.5 * mass[p] / (dt * dt);
+  if (stiffness > most) ++counts.softened;
+  const Vec3 f = out * (std::min(stiffness, most) * deep);
+  fx[p] += static_cast<Real>(f.x);
+  fy[p] += static_cast<Real>(f.y);
+  fz[p] += static_cast<Real>(f.z);
+  return f;
+}
+
+template <class Real>
+void TissueDynamics<Real>::Impl::find_planes() {
+  planes.clear();
+  for (std::size_t n = 0; n < surface.size(); ++n) {
+    const std::uint32_t p = surface[n];
+    if (inverse_mass[p] == 0) continue;
+    const Vec3 at{static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])};
+    Vec3 out;
+    const double d = obstacle.shape->distance_mm(at, out) - allowed[n];
+    if (d < margin) planes.push_back({p, out, dot(out, at) - d});
+  }
+}
+
+template <class Real>
 Vec3 TissueDynamics<Real>::Impl::forces() {
   static const auto function = force_function<Real>();
   std::copy(lx.begin(), lx.end(), fx.begin());
@@ -251,31 +301,30 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   function(arrays);
   Vec3 on_tool{};
   met = 0;
-  const auto hold = [&] {
-    for (const Slider& q : sliders) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        if ((q.held >> a & 1) != 0) (a == 0 ? fx : a == 1 ? fy : fz)[q.point] = 0;
-      }
+  if (tool.shape) {
+    const RigidShape::Ball near = tool.shape->bounds();
+    const Real cx = static_cast<Real>(near.centre_mm.x), cy = static_cast<Real>(near.centre_mm.y), cz = static_cast<Real>(near.centre_mm.z),
+               r = static_cast<Real>(near.radius_mm);
+    for (std::uint32_t p = 0; p < x.size(); ++p) {
+      const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz;
+      if (!(dx * dx + dy * dy + dz * dz < r * r)) continue;
+      Vec3 out;
+      const double d = tool.shape->distance_mm({static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}, out);
+      if (!(d < 0) || out == Vec3{}) continue;
+      ++met;
+      on_tool -= push(p, tool.stiffness_n_per_mm, -d, out);
     }
-  };
-  if (!tool) {
-    hold();
-    return on_tool;
   }
-  const Real cx = static_cast<Real>(tool->centre_mm.x), cy = static_cast<Real>(tool->centre_mm.y),
-             cz = static_cast<Real>(tool->centre_mm.z);
-  const Real r = static_cast<Real>(tool->radius_mm), k = static_cast<Real>(tool->stiffness_n_per_mm);
-  for (std::size_t p = 0; p < x.size(); ++p) {
-    const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz, square = dx * dx + dy * dy + dz * dz;
-    if (!(square < r * r) || !(square > 0)) continue;
-    ++met;
-    const Real far = std::sqrt(square), push = k * (r - far) / far;
-    fx[p] += push * dx;
-    fy[p] += push * dy;
-    fz[p] += push * dz;
-    on_tool -= Vec3{static_cast<double>(push * dx), static_cast<double>(push * dy), static_cast<double>(push * dz)};
+  for (const Plane& q : planes) {
+    const double deep = q.offset - (q.normal.x * static_cast<double>(x[q.point]) + q.normal.y * static_cast<double>(y[q.point]) +
+                                    q.normal.z * static_cast<double>(z[q.point]));
+    if (deep > 0) push(q.point, obstacle.stiffness_n_per_mm, deep, q.normal);
   }
-  hold();
+  for (const Slider& q : sliders) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if ((q.held >> a & 1) != 0) (a == 0 ? fx : a == 1 ? fy : fz)[q.point] = 0;
+    }
+  }
   return on_tool;
 }
 
@@ -284,15 +333,12 @@ Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
   Vec3 on_tool{};
   for (int s = 0; s < steps; ++s) {
+    if (m.obstacle.shape && m.steps++ % kObstacleSteps == 0) m.find_planes();
     on_tool = m.forces();
-    // The tool's points are stiffer: their own limit.
-    const double tool_k = m.tool ? m.tool->stiffness_n_per_mm : 0;
     const Real a = static_cast<Real>(0.5 * m.options.damping_per_s * m.dt), keep = 1 - a, whole = 1 / (1 + a);
     const Real dt2 = static_cast<Real>(m.dt * m.dt);
-    const Real tool_limit = static_cast<Real>(tool_k > 0 ? 1 / (tool_k * m.dt * m.dt) : 1e30);
     for (std::size_t p = 0; p < m.x.size(); ++p) {
-      // A point lighter than the tool's stiffness allows is moved as if it were heavier.
-      const Real w = dt2 * std::min(m.inverse_mass[p], tool_limit);
+      const Real w = dt2 * m.inverse_mass[p];
       const Real nx = (2 * m.x[p] - keep * m.px[p] + w * m.fx[p]) * whole, ny = (2 * m.y[p] - keep * m.py[p] + w * m.fy[p]) * whole,
                  nz = (2 * m.z[p] - keep * m.pz[p] + w * m.fz[p]) * whole;
       m.px[p] = m.x[p];

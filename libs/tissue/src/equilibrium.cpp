@@ -1,18 +1,71 @@
 #include "osteo/tissue/equilibrium.h"
 
 #include <Eigen/Eigenvalues>
+#ifdef OSTEO_WITH_CHOLMOD
+#include <Eigen/CholmodSupport>
+#endif
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
 
+#ifdef OSTEO_WITH_CHOLMOD
+extern "C" void openblas_set_num_threads(int) __attribute__((weak));  // where BLAS is that one
+#endif
+
 namespace osteo {
 namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
+using Simplicial = Eigen::SimplicialLLT<Matrix, Eigen::Lower>;
+
+// Sparse Cholesky: Eigen's own for small systems; for large ones, where this build has it, CHOLMOD's with dense blocks through BLAS, in one
+// thread so that sums come in one order.
+class Factor {
+ public:
+  // False where the matrix, with `shift` on its diagonal, is not positive definite.
+  bool factorise(const Matrix& h, double shift) {
+#ifdef OSTEO_WITH_CHOLMOD
+    if (h.rows() >= kLarge) {
+      if (!large_) {
+        large_ = std::make_unique<Supernodal>();
+        large_->cholmod().print = 0;  // else it tells stdout of every matrix that is not positive definite
+        if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
+        large_->analyzePattern(h);
+      }
+      large_->setShift(shift);
+      large_->factorize(h);
+      return large_->info() == Eigen::Success;
+    }
+#endif
+    if (!small_) {
+      small_ = std::make_unique<Simplicial>();
+      small_->analyzePattern(h);
+    }
+    small_->setShift(shift);
+    small_->factorize(h);
+    return small_->info() == Eigen::Success;
+  }
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const {
+#ifdef OSTEO_WITH_CHOLMOD
+    if (large_) return large_->solve(right);
+#endif
+    return small_->solve(right);
+  }
+
+ private:
+#ifdef OSTEO_WITH_CHOLMOD
+  using Supernodal = Eigen::CholmodSupernodalLLT<Matrix, Eigen::Lower>;
+  static constexpr Eigen::Index kLarge = 1500;  // rows: below, the other is as quick
+  std::unique_ptr<Supernodal> large_;
+#endif
+  std::unique_ptr<Simplicial> small_;
+};
+
 constexpr std::uint32_t kFixed = 0xffffffffU;
 
 std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
@@ -65,8 +118,7 @@ struct EquilibriumSolver::Impl {
   std::vector<std::uint32_t> first;  // of each element in slots
   std::vector<std::int64_t> slots;   // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
   Matrix h;
-  Eigen::SimplicialLLT<Matrix, Eigen::Lower> factor;
-  bool analysed = false;
+  Factor factor;
 
   // What of a vector at a point lies along axes that may move.
   [[nodiscard]] Vec3 of_free(std::uint32_t p, Vec3 v) const {
@@ -280,15 +332,9 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
       double mean = 0;
       for (Eigen::Index d = 0; d < n; ++d) mean += std::abs(m.h.coeff(d, d)) / static_cast<double>(n);
       shift = shift > 1e-9 * mean ? 0.1 * shift : 0;
-      if (!m.analysed) {
-        m.factor.analyzePattern(m.h);
-        m.analysed = true;
-      }
       for (int tries = 0;; ++tries) {
-        m.factor.setShift(shift);
-        m.factor.factorize(m.h);
         ++result.factorisations;
-        if (m.factor.info() == Eigen::Success) break;
+        if (m.factor.factorise(m.h, shift)) break;
         ++result.shifted;
         shift = shift > 0 ? 4 * shift : 1e-4 * mean;
         if (tries == 40 || !std::isfinite(mean)) {

@@ -65,7 +65,8 @@ FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::u
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
   for (std::size_t t = 0; t < tets.size(); ++t) {
     for (const std::uint32_t p : tets[t]) {
-      if (p >= corners_) throw Error(ExitCode::usage, "tetrahedron " + std::to_string(t) + " names point " + std::to_string(p) + ", which is not there");
+      if (p >= corners_)
+        throw Error(ExitCode::usage, "tetrahedron " + std::to_string(t) + " names point " + std::to_string(p) + ", which is not there");
       nodes_.push_back(p);
     }
     for (int e = 0; e < 6 && per_ == 10; ++e) {
@@ -80,7 +81,9 @@ FemBody::FemBody(std::span<const Vec3> points, std::span<const std::array<std::u
     const Vec3 o = points[tets[t][0]];
     const Vec3 d[3] = {points[tets[t][1]] - o, points[tets[t][2]] - o, points[tets[t][3]] - o};
     const double six = dot(d[0], cross(d[1], d[2]));
-    if (!(six > 0)) throw Error(ExitCode::corrupt, "tetrahedron " + std::to_string(t) + " has no volume, or is inside out", "mesh-info tells of all of them");
+    if (!(six > 0))
+      throw Error(ExitCode::corrupt, "tetrahedron " + std::to_string(t) + " has no volume, or is inside out",
+                  "mesh-info tells of all of them");
     Vec3 corner[4];  // gradients of the barycentric coordinates
     corner[1] = cross(d[1], d[2]) / six;
     corner[2] = cross(d[2], d[0]) / six;
@@ -265,7 +268,8 @@ TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
   for (const auto& [edge, force] : load.edge_forces_n) {
     const auto found = middle.find({std::min(edge[0], edge[1]), std::max(edge[0], edge[1])});
     if (found == middle.end())
-      throw Error(ExitCode::usage, "a force acts between points " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]) + ", which no edge joins");
+      throw Error(ExitCode::usage,
+                  "a force acts between points " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]) + ", which no edge joins");
     for (const std::uint32_t end : edge) all.forces_n.push_back({end, force * -0.5});
     all.forces_n.push_back({found->second, force});
   }

@@ -44,7 +44,7 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, b
     const auto j = ordered_json::parse(json, nullptr, true, true);
     if (j.at("osteotome_tissue") != 1) throw refuse("\"osteotome_tissue\" must be 1");
     where = "material";
-    const Material general = material(j.at("material"));
+    const Material general = problem.general = material(j.at("material"));
     const auto regions = j.value("regions", ordered_json::array());
     problem.materials.assign(regions.empty() ? 1 : mesh.tets.size(), general);
     int number = 0;
@@ -132,19 +132,29 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, b
 }
 
 TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, const std::optional<std::string>& constants_json) {
+  const auto constants = [&]() -> std::optional<ordered_json> {
+    if (!constants_json) return std::nullopt;
+    try {
+      auto j = ordered_json::parse(*constants_json);
+      if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
+      return j;
+    } catch (const nlohmann::json::exception& e) {
+      throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
+    }
+  }();
   // One material a voxel, from those of its tetrahedra.
   std::vector<Material> materials;
   const std::size_t step = problem.materials.size() == 1 ? 1 : 5;
   for (std::size_t t = 0; t < problem.materials.size(); t += step) materials.push_back(problem.materials[t]);
+  if (constants && constants->contains("base")) materials.assign(1, material(constants->at("base")));
   TissueModel model = TissueModel::of_voxels(points_of(mesh), tets_of(mesh), materials);
-  if (!constants_json) {
+  if (!constants) {
     model.scale({1, 1, 0, 1});
     return model;
   }
   try {
-    const auto j = ordered_json::parse(*constants_json);
-    if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
-    return with_log_factors(model, j.at("grid").get<std::array<int, 3>>(), j.at("log_factors").get<std::vector<double>>());
+    return with_log_factors(model, constants->at("grid").get<std::array<int, 3>>(),
+                            constants->at("log_factors").get<std::vector<double>>());
   } catch (const nlohmann::json::exception& e) {
     throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
   }

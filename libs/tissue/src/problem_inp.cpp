@@ -205,6 +205,7 @@ class Reader {
       if (!(problem_.materials[t].young_mpa > 0))
         throw Error(ExitCode::usage, "the tissue problem, materials: tetrahedron " + std::to_string(t) + " has none");
     }
+    problem_.general = problem_.materials[0];
     const auto same = [&](const Material& m) {
       return m.young_mpa == problem_.materials[0].young_mpa && m.poisson == problem_.materials[0].poisson;
     };

@@ -2,92 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
-#include "osteo/base/error.h"
-#include "osteo/tissue/calibrate.h"
+#include "osteo/base/param.h"
 #include "osteo/tissue/dynamics.h"
-#include "osteo/tissue/problem.h"
+#include "osteo/tissue/implicit.h"
+#include "stage_parts.h"
 
 namespace osteo {
-namespace {
 
-using nlohmann::ordered_json;
-
-constexpr std::size_t kManyTets = 60'000;  // quadratic elements of more take minutes and gigabytes
-constexpr double kSafePoisson = 0.4;       // above, linear elements lock
-
-struct Truth {
-  ElasticLaw law;
-  TetOrder order;
-  std::string because;
-};
-
-// Which finite elements: as asked, as the problem's own file says, or by Poisson's ratio and size.
-Truth truth_of(LawChoice law, OrderChoice order, const TissueProblem& problem, const TetMesh& mesh) {
-  Truth t{law == LawChoice::automatic ? problem.law.value_or(ElasticLaw::neo_hooke) : static_cast<ElasticLaw>(static_cast<int>(law) - 1),
-          order == OrderChoice::t4 ? TetOrder::t4 : TetOrder::t10, "asked for"};
-  if (order != OrderChoice::automatic) return t;
-  double poisson = 0;
-  for (const Material& m : problem.materials) poisson = std::max(poisson, m.poisson);
-  if (problem.order) {
-    t.order = *problem.order;
-    t.because = "as in the .inp file";
-    if (t.order == TetOrder::t4 && poisson > kSafePoisson)
-      t.because += "; linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson);
-  } else if (mesh.tets.size() > kManyTets && poisson <= kSafePoisson) {
-    t.order = TetOrder::t4;
-    t.because = std::to_string(mesh.tets.size()) + " tetrahedra, and none locks at a Poisson's ratio of " + format_number(poisson) +
-                ": linear ones";
-  } else {
-    t.because = poisson > kSafePoisson ? "linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson)
-                                       : "linear tetrahedra bend too little";
-  }
-  return t;
-}
-
-std::string_view name_of(TetOrder order) {
-  return order == TetOrder::t4 ? "t4" : "t10";
-}
-
-std::size_t load_named(const TissueProblem& problem, const std::string& name) {
-  if (name.empty()) return 0;
-  std::string names;
-  for (std::size_t n = 0; n < problem.load_names.size(); ++n) {
-    if (problem.load_names[n] == name) return n;
-    names += (n > 0 ? ", " : "") + problem.load_names[n];
-  }
-  throw Error(ExitCode::usage, "there is no load '" + name + "'", "the loads are: " + names);
-}
-
-Tets moved_mesh(const TetMesh& mesh, std::span<const Vec3> x) {
-  TetMesh moved;
-  moved.points_mm.resize(mesh.points_mm.size());
-  for (std::size_t p = 0; p < moved.points_mm.size(); ++p) moved.points_mm[p] = to_floats(x[p]);
-  moved.tets.resize(mesh.tets.size());
-  std::copy(mesh.tets.begin(), mesh.tets.end(), moved.tets.begin());
-  return std::make_shared<const TetMesh>(std::move(moved));
-}
-
-ordered_json moves(std::span<const Vec3> rest, std::span<const Vec3> x) {
-  double most = 0, sum = 0;
-  for (std::size_t p = 0; p < rest.size(); ++p) {
-    const double d = length(x[p] - rest[p]);
-    most = std::max(most, d);
-    sum += d * d;
-  }
-  return {{"rms_mm", std::sqrt(sum / static_cast<double>(rest.size()))}, {"largest_mm", most}};
-}
-
-Error not_at_rest(const Equilibrium& r, const std::string& advice) {
-  return Error(ExitCode::failed, "the body does not come to rest: " + r.why, advice);
-}
-
-std::string written(const ordered_json& j) {
-  return j.dump(1) + "\n";
-}
-
-}  // namespace
+using namespace tissue;
 
 StageInfo FemStage::info() {
   return {.name = "fem",
@@ -113,7 +36,7 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
   const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
   const std::size_t n = load_named(problem, p.load);
-  const Truth elements = truth_of(p.law, p.order, problem, mesh);
+  const Elements elements = elements_for(p.law, p.order, problem, mesh);
   const FemBody body(points_of(mesh), tets_of(mesh), problem.materials, elements.law, elements.order);
   const TissueLoad load = body.on_all_points(problem.loads[n]);
   EquilibriumSolver solver(body, body.rest(), load);
@@ -128,9 +51,9 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   for (const Slider& q : load.sliders) {
     for (std::size_t a = 0; a < 3; ++a) reaction[a] += (q.held >> a & 1) != 0 ? g[q.point][a] : 0;
   }
-  const ordered_json moved = moves({body.rest().data(), corners.size()}, corners);
+  const ordered_json moved = displacement({body.rest().data(), corners.size()}, corners);
   const ordered_json j{{"load", problem.load_names[n]},
-                       {"law", EnumNames<LawChoice>::values[static_cast<std::size_t>(elements.law) + 1]},
+                       {"law", name_of(elements.law)},
                        {"order", name_of(elements.order)},
                        {"order_because", elements.because},
                        {"points", body.point_count()},
@@ -151,174 +74,141 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   return {moved_mesh(mesh, corners), Document{written(j)}, std::move(inp)};
 }
 
-StageInfo CalibrateStage::info() {
-  return {
-      .name = "calibrate",
-      .version = 1,
-      .synopsis = "constants of the fast tissue model, fitted to finite elements",
-      .description =
-          "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
-          "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
-          "(Ceres). The "
-          "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
-          "against quadratic tetrahedra); uncertain factors; the course of the fit.",
-      .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
-                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"}},
-      .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
-                  {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
-                     "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
-      .example = "osteo calibrate tissue.vtu problem.json constants.json --fit pull"};
-}
-
-std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
-  const TetMesh& mesh = *std::get<Tets>(inputs[0]);
-  const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
-  const auto points = points_of(mesh);
-  const auto tets = tets_of(mesh);
-  TissueModel model = model_of_problem(mesh, problem);
-  std::vector<std::size_t> fitted;
-  for (std::size_t at = 0; at < p.fit.size();) {
-    const std::size_t comma = std::min(p.fit.find(',', at), p.fit.size());
-    fitted.push_back(load_named(problem, p.fit.substr(at, comma - at)));
-    at = comma + 1;
-  }
-  if (fitted.empty()) fitted.push_back(0);
-  const Truth elements = truth_of(p.law, p.order, problem, mesh);
-  const auto solve = [&](TetOrder order, const TissueLoad& load) {
-    const FemBody body(points, tets, problem.materials, elements.law, order);
-    const TissueLoad all = body.on_all_points(load);
-    EquilibriumSolver solver(body, body.rest(), all);
-    Equilibrium r = solver.solve(body, body.rest(), all.forces_n, {1e-10, 100, 1}, context);
-    if (!r.converged) throw not_at_rest(r, "make the load smaller");
-    r.points_mm.resize(points.size());
-    return r.points_mm;
-  };
-  // The truth, and how far it may be off itself: the other order on the same mesh.
-  std::vector<std::vector<Vec3>> truth;
-  std::vector<double> doubt;
-  for (std::size_t n = 0; n < problem.loads.size(); ++n) {
-    context.progress(0.5 * static_cast<double>(n) / static_cast<double>(problem.loads.size()), "finite elements");
-    truth.push_back(solve(elements.order, problem.loads[n]));
-    doubt.push_back(
-        calibration_error(points, solve(elements.order == TetOrder::t4 ? TetOrder::t10 : TetOrder::t4, problem.loads[n]), truth.back())
-            .nrms);
-  }
-  std::vector<CalibrationCase> cases;
-  for (const std::size_t n : fitted) cases.push_back({problem.loads[n], truth[n]});
-  CalibrateOptions options;
-  options.grid = {p.grid_x, p.grid_y, p.grid_z};
-  options.shared_grid = p.shared_grid;
-  options.pull = p.pull;
-  options.starts = p.starts;
-  options.iterations = p.iterations;
-  const Calibration c = calibrate(model, cases, options, context);
-  if (c.after.empty()) throw Error(ExitCode::failed, c.why, "make the loads smaller");
-  ordered_json j{{"osteotome_tissue_constants", 1},
-                 {"grid", options.grid},
-                 {"order_of_factors", {"axis edges", "diagonal edges", "faces", "volumes"}},
-                 {"log_factors", c.log_factors}};
-  if (c.log_stiffness.size() > 1) j["log_stiffness"] = c.log_stiffness;
-  j["uncertainty_of_parameters"] = c.uncertainty;
-  j["converged"] = c.converged;
-  if (!c.why.empty()) j["why"] = c.why;
-  j["parameters"] = c.parameters;
-  j["equilibrium_solves"] = c.solves;
-  j["failed_solves"] = c.failed_solves;
-  j["seconds"] = c.seconds;
-  j["cost"] = c.cost;
-  j["loads"] = ordered_json::array();
-  TissueModel plain = model;
-  plain.scale({1, 1, 0, 1});
-  EquilibriumSolver solver(model, model.rest(), problem.fixed, problem.sliders);
-  Tets deformed;
-  double unseen = 0;
-  for (std::size_t n = 0; n < problem.loads.size(); ++n) {
-    const bool used = std::find(fitted.begin(), fitted.end(), n) != fitted.end();
-    const Equilibrium before = solver.solve(plain, model.rest(), problem.loads[n].forces_n, {}, context);
-    const Equilibrium after = solver.solve(model, model.rest(), problem.loads[n].forces_n, {}, context);
-    if (n == fitted.front()) deformed = moved_mesh(mesh, after.points_mm);
-    const CalibrationError b = calibration_error(points, before.points_mm, truth[n]),
-                           a = calibration_error(points, after.points_mm, truth[n]);
-    j["loads"].push_back({{"name", problem.load_names[n]},
-                          {"fitted", used},
-                          {"truth_rms_mm", a.truth_rms_mm},
-                          {"truth_off_other_order", doubt[n]},
-                          {"closed_form_nrms", b.nrms},
-                          {"nrms", a.nrms},
-                          {"nrms_free_of_rigid", a.nrms_free_of_rigid},
-                          {"rms_mm", a.rms_mm},
-                          {"at_rest", after.converged}});
-    if (!used) unseen = std::max(unseen, a.nrms);
-  }
-  context.report("nrms", c.after.front().nrms);
-  context.report("closed_form_nrms", c.before.front().nrms);
-  context.report("worst_nrms_not_fitted", unseen);
-  context.report("equilibrium_solves", static_cast<std::int64_t>(c.solves));
-  context.progress(1);
-  return {Document{written(j)}, deformed};
-}
-
 StageInfo SimulateStage::info() {
-  return {.name = "simulate",
-          .version = 1,
-          .synopsis = "a soft body in time, by the fast distance and volume model",
-          .description =
-              "Explicit steps with a limit that is certified; lumped masses, viscous damping. Constants in closed form from the problem's "
-              "materials, or "
-              "those that calibrate found. Ends at rest, by the balance of forces.",
-          .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
-                     {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"},
-                     {"constants", {DataKind::document}, "of calibrate", true}},
-          .outputs = {{"deformed", {DataKind::tets}, "the mesh at the end"},
-                      {"report", {DataKind::document}, "steps, energies, residual, clamps, in JSON", true}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4"},
-          .example = "osteo simulate tissue.vtu problem.json deformed.vtu --constants constants.json"};
+  return {
+      .name = "simulate",
+      .version = 1,
+      .synopsis = "a soft body in time, by the fast distance and volume model",
+      .description =
+          "Explicit steps with a limit that is certified, or implicit ones of any length for stiff bodies; lumped masses, viscous damping. "
+          "Constants in closed form from the problem's materials, or those that calibrate found. A ball can be pushed into the body "
+          "(an indentation), and a surface such as bone be in its way. Ends at rest, by the balance of forces.",
+      .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
+                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON"},
+                 {"constants", {DataKind::document}, "of calibrate", true},
+                 {"obstacle", {DataKind::surface}, "closed surface that the body does not enter, such as bone", true}},
+      .outputs = {{"deformed", {DataKind::tets}, "the mesh at the end"},
+                  {"report", {DataKind::document}, "steps, energies, residual, clamps, in JSON", true}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.4"},
+      .example = "osteo simulate tissue.vtu problem.json deformed.vtu --constants constants.json"};
 }
+
+namespace {
+
+struct Course {
+  long done = 0;
+  bool at_rest = false;
+  double tool_now_n = 0, tool_most_n = 0;
+};
+
+// Both ways of going on in time, until rest or the end.
+template <class Dynamics>
+Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const Context& context) {
+  Course c;
+  const auto steps = static_cast<long>(std::ceil(p.seconds / dynamics.step_s()));
+  const Vec3 from{p.tool_from_mm[0], p.tool_from_mm[1], p.tool_from_mm[2]}, to{p.tool_to_mm[0], p.tool_to_mm[1], p.tool_to_mm[2]};
+  const bool tool = p.tool_radius_mm > 0;
+  while (c.done < steps && !c.at_rest) {
+    const double share = static_cast<double>(c.done) / static_cast<double>(steps), way = std::min(1.0, 2 * share);
+    if (tool) dynamics.set_tool({std::make_shared<BallShape>(from + (to - from) * way, p.tool_radius_mm), p.tool_stiffness_n_per_mm});
+    const int now = static_cast<int>(std::min<long>(tool ? std::max(1, batch / 10) : batch, steps - c.done));
+    const Vec3 force = dynamics.step(now);
+    c.done += now;
+    c.tool_now_n = length(force);
+    c.tool_most_n = std::max(c.tool_most_n, c.tool_now_n);
+    context.progress(static_cast<double>(c.done) / static_cast<double>(steps), "steps");
+    c.at_rest = p.until_rest && (!tool || way >= 1) && dynamics.residual() < 1e-3 && dynamics.kinetic_mj() < 1e-6 * dynamics.elastic_mj();
+  }
+  return c;
+}
+
+}  // namespace
 
 std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const TetMesh& mesh = *std::get<Tets>(inputs[0]);
-  const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
-  const std::size_t n = load_named(problem, p.load);
+  const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh, false);
   const auto* const constants = std::get_if<Document>(&inputs[2]);
   const TissueModel model = model_of_problem(mesh, problem, constants != nullptr ? std::optional(constants->json) : std::nullopt);
-  DynamicsOptions options;
-  options.density_kg_m3 = p.density_kg_m3;
-  options.damping_per_s = p.damping_per_s;
-  options.least_step_s = p.least_step_ms / 1000;
-  TissueDynamics<double> dynamics(model, problem.fixed, options,
-                                  problem.sliders);  // as quick, and single precision never balances to a thousandth
-  dynamics.set_load(problem.loads[n].forces_n);
-  const auto steps = static_cast<long>(std::ceil(p.seconds / dynamics.step_s()));
-  long done = 0;
-  bool at_rest = false;
-  while (done < steps && !at_rest) {
-    const int batch = static_cast<int>(std::min<long>(200, steps - done));
-    dynamics.step(batch);
-    done += batch;
-    context.progress(static_cast<double>(done) / static_cast<double>(steps), "steps");
-    at_rest = p.until_rest && dynamics.residual() < 1e-3 && dynamics.kinetic_mj() < 1e-6 * dynamics.elastic_mj();
+  RigidContact obstacle{nullptr, p.obstacle_stiffness_n_per_mm};
+  if (const auto* const surface = std::get_if<Surface>(&inputs[3])) {
+    Vec3 lo = model.rest().front(), hi = lo;
+    for (const Vec3& q : model.rest()) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], q[a]);
+        hi[a] = std::max(hi[a], q[a]);
+      }
+    }
+    const Vec3 size = hi - lo;
+    const double around = 0.25 * std::max({size.x, size.y, size.z});
+    const auto& t = model.tets().front();
+    obstacle.shape = std::make_shared<SurfaceShape>(**surface, lo - Vec3{around, around, around}, hi + Vec3{around, around, around},
+                                                    length(model.rest()[t[1]] - model.rest()[t[0]]) / 4, context.sub(0, 0.1));
   }
-  const auto x = dynamics.positions_mm();
-  const ordered_json j{{"load", problem.load_names[n]},
-                       {"steps", done},
-                       {"step_ms", 1000 * dynamics.step_s()},
-                       {"simulated_s", static_cast<double>(done) * dynamics.step_s()},
-                       {"at_rest", at_rest},
-                       {"residual", dynamics.residual()},
-                       {"elastic_mj", dynamics.elastic_mj()},
-                       {"kinetic_mj", dynamics.kinetic_mj()},
-                       {"displacement", moves(model.rest(), x)},
-                       {"inverted_tetrahedra", model.inverted(x)},
-                       {"places_not_finite", dynamics.counts().not_finite},
-                       {"points_made_heavier", dynamics.counts().made_heavier}};
-  if (dynamics.counts().made_heavier > 0)
-    context.warn(std::to_string(dynamics.counts().made_heavier) + " points were made heavier for steps of " +
-                 format_number(p.least_step_ms) + " ms: motion is slower than it would be");
-  if (p.until_rest && !at_rest)
-    context.warn("not at rest after " + format_number(p.seconds) + " s: residual " + format_number(dynamics.residual()));
-  context.report("step_ms", 1000 * dynamics.step_s());
-  context.report("steps", static_cast<std::int64_t>(done));
+  std::vector<std::pair<std::uint32_t, Vec3>> load;
+  std::string name = "none";
+  if (p.load != "none" && !problem.loads.empty()) {
+    const std::size_t n = load_named(problem, p.load);
+    load = problem.loads[n].forces_n;
+    name = problem.load_names[n];
+  } else if (p.load != "none" && !p.load.empty()) {
+    load_named(problem, p.load);
+  }
+  ordered_json j{{"load", name}};
+  Course c;
+  std::vector<Vec3> x;
+  const auto report = [&](const auto& dynamics) {
+    x = dynamics.positions_mm();
+    j["steps"] = c.done;
+    j["step_ms"] = 1000 * dynamics.step_s();
+    j["simulated_s"] = static_cast<double>(c.done) * dynamics.step_s();
+    j["at_rest"] = c.at_rest;
+    j["residual"] = dynamics.residual();
+    j["elastic_mj"] = dynamics.elastic_mj();
+    j["kinetic_mj"] = dynamics.kinetic_mj();
+    if (p.tool_radius_mm > 0) {
+      j["tool_n"] = c.tool_now_n;
+      j["tool_most_n"] = c.tool_most_n;
+    }
+    j["displacement"] = displacement(model.rest(), x);
+    j["inverted_tetrahedra"] = model.inverted(x);
+    if (p.until_rest && !c.at_rest)
+      context.warn("not at rest after " + format_number(p.seconds) + " s: residual " + format_number(dynamics.residual()));
+    context.report("step_ms", 1000 * dynamics.step_s());
+  };
+  if (p.method == TimeMethod::implicit_steps) {
+    ImplicitDynamics dynamics(model, problem.fixed, {p.density_kg_m3, p.damping_per_s, p.step_ms / 1000}, problem.sliders);
+    dynamics.set_load(load);
+    dynamics.set_obstacle(obstacle);
+    c = go_on(dynamics, p, 1, context);
+    report(dynamics);
+    j["newton_iterations"] = dynamics.counts().iterations;
+    j["steps_unfinished"] = dynamics.counts().unfinished;
+    if (dynamics.counts().unfinished > 0)
+      context.warn(std::to_string(dynamics.counts().unfinished) + " steps ended before their residual was small");
+  } else {
+    DynamicsOptions options;
+    options.density_kg_m3 = p.density_kg_m3;
+    options.damping_per_s = p.damping_per_s;
+    options.least_step_s = p.least_step_ms / 1000;
+    // As quick as floats, which never balance to a thousandth.
+    TissueDynamics<double> dynamics(model, problem.fixed, options, problem.sliders);
+    dynamics.set_load(load);
+    dynamics.set_obstacle(obstacle);
+    c = go_on(dynamics, p, 200, context);
+    report(dynamics);
+    const auto& counts = dynamics.counts();
+    j["places_not_finite"] = counts.not_finite;
+    j["points_made_heavier"] = counts.made_heavier;
+    j["pushes_softened"] = counts.softened;
+    if (counts.made_heavier > 0)
+      context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " + format_number(p.least_step_ms) +
+                   " ms: motion is slower than it would be");
+    if (counts.softened > 0)
+      context.warn(std::to_string(counts.softened) +
+                   " pushes were softer than asked for, so that steps stay stable; --method implicit needs no such limit");
+  }
+  context.report("steps", static_cast<std::int64_t>(c.done));
+  if (p.tool_radius_mm > 0) context.report("tool_n", c.tool_now_n);
   context.progress(1);
   return {moved_mesh(mesh, x), Document{written(j)}};
 }

@@ -6,11 +6,13 @@
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkImageConstantPad.h>
 #include <vtkImageData.h>
+#include <vtkMapper.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
+#include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
 #include <cmath>
@@ -167,8 +169,61 @@ vtkSmartPointer<vtkActor> structure_actor(const Labels& labels, const Structure&
   return actor;
 }
 
-// The half of a mesh that is farther from the eye, so that its inside shows.
-TriMesh half_of(const TetMesh& mesh, Vec3 eye) {
+// Values as colours, dark to light (after viridis); on a logarithmic scale where they are all above 0 and span more than a factor of five.
+class Colours {
+ public:
+  explicit Colours(std::span<const float> values) {
+    const auto [lo, hi] = std::minmax_element(values.begin(), values.end());
+    low_ = static_cast<double>(*lo);
+    high_ = static_cast<double>(*hi);
+    logarithmic_ = low_ > 0 && high_ > 5 * low_;
+  }
+  // Of a share of the range.
+  static std::array<unsigned char, 3> at(double share) {
+    constexpr double kStops[5][3] = {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
+    const double t = 4 * std::clamp(share, 0.0, 1.0);
+    const auto i = static_cast<std::size_t>(std::min(3.0, std::floor(t)));
+    std::array<unsigned char, 3> rgb{};
+    for (std::size_t c = 0; c < 3; ++c)
+      rgb[c] = static_cast<unsigned char>(std::lround(kStops[i][c] + (t - static_cast<double>(i)) * (kStops[i + 1][c] - kStops[i][c])));
+    return rgb;
+  }
+  [[nodiscard]] std::array<unsigned char, 3> of(double value) const {
+    if (!(high_ > low_)) return at(0.5);
+    return at(logarithmic_ ? std::log(value / low_) / std::log(high_ / low_) : (value - low_) / (high_ - low_));
+  }
+  [[nodiscard]] double value(double share) const {
+    return logarithmic_ ? low_ * std::pow(high_ / low_, share) : low_ + share * (high_ - low_);
+  }
+
+ private:
+  double low_ = 0, high_ = 0;
+  bool logarithmic_ = false;
+};
+
+void write_legend(Picture& picture, const TetMesh& mesh) {
+  const Colours colours(mesh.values);
+  constexpr int kWidth = 16, kHeight = 180, kMargin = 24;
+  const int x = picture.width - 110, y = kMargin + 16;
+  for (int row = 0; row < kHeight; ++row) {
+    const auto rgb = Colours::at(1 - static_cast<double>(row) / (kHeight - 1));
+    for (int column = 0; column < kWidth; ++column) {
+      const auto i =
+          3 * (static_cast<std::size_t>(y + row) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x + column));
+      if (x < 0 || i + 2 >= picture.rgb.size()) return;
+      std::copy(rgb.begin(), rgb.end(), picture.rgb.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+  for (const double share : {0.0, 0.5, 1.0}) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", colours.value(share));
+    write_text(picture, text, x + kWidth + 8, y + static_cast<int>((1 - share) * (kHeight - 1)) + 6, 15);
+  }
+  write_text(picture, mesh.values_name, x - 20, y - 14, 15);
+}
+
+// The half of a mesh that is farther from the eye, so that its inside shows; coloured where the mesh has values.
+vtkSmartPointer<vtkPolyData> half_of(const TetMesh& mesh, Vec3 eye) {
   const auto at = [&](std::uint32_t v) { return Vec3{mesh.points_mm[v][0], mesh.points_mm[v][1], mesh.points_mm[v][2]}; };
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (std::uint32_t v = 0; v < mesh.points_mm.size(); ++v) {
@@ -189,7 +244,17 @@ TriMesh half_of(const TetMesh& mesh, Vec3 eye) {
     const double c = (at(t[0])[axis] + at(t[1])[axis] + at(t[2])[axis] + at(t[3])[axis]) / 4;
     if ((c - middle) * eye[axis] <= 0) half.tets.push_back(t);
   }
-  return boundary_of(half);
+  std::vector<std::uint32_t> point_of;
+  const auto surface = to_vtk(boundary_of(half, &point_of));
+  if (!mesh.values.empty()) {
+    const Colours colours(mesh.values);
+    vtkNew<vtkUnsignedCharArray> rgb;
+    rgb->SetName("colour");
+    rgb->SetNumberOfComponents(3);
+    for (const std::uint32_t p : point_of) rgb->InsertNextTypedTuple(colours.of(static_cast<double>(mesh.values[p])).data());
+    surface->GetPointData()->SetScalars(rgb);
+  }
+  return surface;
 }
 
 // The zero level of a map of distances, as bone of density 1/2 at the surface.
@@ -210,7 +275,7 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
   for (const Data* data : {&s.mask, &s.subject}) {
     if (data == &s.mask && !mask_is_bone) continue;
     if (const auto* surface = std::get_if<Surface>(data)) return to_vtk(**surface);
-    if (const auto* tets = std::get_if<Tets>(data)) return to_vtk(half_of(**tets, eye_direction(p.view)));
+    if (const auto* tets = std::get_if<Tets>(data)) return half_of(**tets, eye_direction(p.view));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm")
       return to_vtk(zero_of(*grid, context));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
@@ -295,6 +360,7 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
       bone->GetProperty()->SetEdgeVisibility(1);
       bone->GetProperty()->SetEdgeColor(0.25, 0.22, 0.18);
       bone->GetProperty()->SetInterpolationToFlat();
+      if (surface->GetPointData()->GetScalars() != nullptr) bone->GetMapper()->ScalarVisibilityOn();
     }
     if (!structures.empty() && std::holds_alternative<Labels>(s.mask)) {
       bone->GetProperty()->SetOpacity(0.3);
@@ -312,6 +378,7 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
   }
   write_text(picture, "seen from " + std::string(EnumNames<ViewFrom>::values[static_cast<std::size_t>(p.view)]), p.width - sw + 10,
              p.height - sh + 24, 15, {150, 165, 180});
+  if (const auto* tets = std::get_if<Tets>(&s.subject); tets != nullptr && !(*tets)->values.empty()) write_legend(picture, **tets);
   if (!p.title.empty()) write_text(picture, p.title, p.width - sw + 10, p.height - 12, 16);
   context.progress(1.0);
   return picture;
@@ -323,7 +390,8 @@ StageInfo SnapshotStage::info() {
           .synopsis = "a picture (PNG) of a CT, mask, grid, surface or tetrahedra",
           .description =
               "Three cuts through the middle (axial seen from the feet: the patient's left is on the right) and a lit view in "
-              "3D. Of tetrahedra the half that faces away, with its edges; of a distance grid lines of equal distance. Needs no display.",
+              "3D. Of tetrahedra the half that faces away, with its edges, coloured by the values at its points where it has some; of a "
+              "distance grid lines of equal distance. Needs no display.",
           .inputs = {{"subject", {DataKind::image, DataKind::labels, DataKind::grid, DataKind::surface, DataKind::tets}, "what to show"},
                      {"mask", {DataKind::labels, DataKind::grid}, "tinted over the cuts and shown in 3D", true},
                      {"surface", {DataKind::surface}, "shown in 3D", true}},

@@ -14,7 +14,8 @@ struct Block {
   std::vector<Vec3> points;
   std::vector<std::array<std::uint32_t, 4>> tets;
 };
-inline Block block(int nx, int ny, int nz, double h, const std::function<bool(Vec3)>& f = [](Vec3) { return true; }) {
+inline Block block(
+    int nx, int ny, int nz, double h, const std::function<bool(Vec3)>& f = [](Vec3) { return true; }) {
   Block b;
   std::map<std::array<int, 3>, std::uint32_t> index;
   const auto point = [&](int i, int j, int k) {

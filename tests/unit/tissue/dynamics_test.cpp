@@ -135,7 +135,7 @@ TEST(Dynamics, AToolPushesAndTeleportsWithoutHarm) {
   TissueDynamics<float> d(model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 200});
   Vec3 force{};
   for (int n = 0; n < 3000; ++n) {
-    d.set_tool(BallTool{{6, 6, 6 + 3 - 0.001 * std::min(n, 1500)}, 3, 0.5});
+    d.set_tool({std::make_shared<BallShape>(Vec3{6, 6, 6 + 3 - 0.001 * std::min(n, 1500)}, 3), 0.5});
     force = d.step();
   }
   EXPECT_GT(force.z, 1e-3);
@@ -143,12 +143,12 @@ TEST(Dynamics, AToolPushesAndTeleportsWithoutHarm) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(-2, 14);
   for (int n = 0; n < 3000; ++n) {
-    if (n % 10 == 0) d.set_tool(BallTool{{u(random), u(random), u(random) / 2}, 3, 0.5});
-    if (n % 500 == 499) d.set_tool(BallTool{{NAN, 0, 0}, 3, 0.5});
+    if (n % 10 == 0) d.set_tool({std::make_shared<BallShape>(Vec3{u(random), u(random), u(random) / 2}, 3), 0.5});
+    if (n % 500 == 499) d.set_tool({std::make_shared<BallShape>(Vec3{NAN, 0, 0}, 3), 0.5});
     const Vec3 f = d.step();
     EXPECT_TRUE(std::isfinite(length(f)));
   }
-  d.set_tool(std::nullopt);
+  d.set_tool({});
   d.step(30000);
   const auto x = d.positions_mm();
   double worst = 0;

@@ -239,7 +239,7 @@ TEST(TissueStability, AMillionTetrahedra) {
   const Material m{0.1, 0.45};
   const TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1), false);
   TissueDynamics<float> d(model, {}, {.density_kg_m3 = 1000, .damping_per_s = 10});
-  d.set_tool(BallTool{{58, 58, 116}, 5, 0.1});
+  d.set_tool({std::make_shared<BallShape>(Vec3{58, 58, 116}, 5), 0.1});
   Vec3 force{};
   for (int n = 0; n < 20; ++n) force = d.step();
   EXPECT_GT(force.z, 0);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "osteo/base/big_array.h"
 #include "osteo/data/tri_mesh.h"
@@ -12,6 +13,8 @@ namespace osteo {
 struct TetMesh {
   BigArray<std::array<float, 3>> points_mm;
   BigArray<std::array<std::uint32_t, 4>> tets;  ///< positive volume: (b-a) x (c-a) . (d-a) > 0
+  std::vector<float> values;                    ///< empty, or one a point: what values_name says, with its unit
+  std::string values_name;                      ///< like "stiffness_kpa"
 };
 using Tets = std::shared_ptr<const TetMesh>;
 

@@ -2,10 +2,11 @@
 #pragma once
 #include <array>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "osteo/tissue/contact.h"
+#include "osteo/tissue/equilibrium.h"
 #include "osteo/tissue/tissue_model.h"
 
 namespace osteo {
@@ -15,13 +16,6 @@ struct DynamicsOptions {
   double damping_per_s = 0;  ///< viscous: forces of -damping * mass * velocity; 0: energy is kept
   double step_share = 0.9;   ///< of the certified limit
   double least_step_s = 0;   ///< a step may be this long at least: points are then made heavier until it is stable, which is counted
-};
-
-/// A ball that pushes points out of itself.
-struct BallTool {
-  Vec3 centre_mm;
-  double radius_mm = 2;
-  double stiffness_n_per_mm = 1;  ///< of each point it meets
 };
 
 /// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the
@@ -36,7 +30,11 @@ class TissueDynamics {
   ~TissueDynamics();
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
-  void set_tool(const std::optional<BallTool>& tool);
+  /// Pushes all points that it meets, at each step.
+  void set_tool(RigidContact tool);
+  /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point. Points that lie in
+  /// it at rest may stay as deep.
+  void set_obstacle(RigidContact obstacle);
   void set_position(std::uint32_t point, Vec3 at_mm);
   /// Cuts off tetrahedra: their voxels' constraints go, without a restart. O(constraints).
   void remove_constraints(std::span<const std::uint32_t> constraints);
@@ -58,6 +56,7 @@ class TissueDynamics {
   struct Counts {
     std::uint64_t not_finite = 0;    ///< points put back where they were because their place was no number
     std::uint64_t made_heavier = 0;  ///< points, for least_step_s
+    std::uint64_t softened = 0;      ///< pushes of tool or obstacle that the step allowed less stiffness than asked for
   };
   [[nodiscard]] const Counts& counts() const;
 

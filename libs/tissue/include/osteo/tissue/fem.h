@@ -22,16 +22,18 @@ struct Material {
 /// constants). neo_hooke: W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2. neo_hooke_split: W = mu/2 (J^(-2/3) tr C - 3) +
 /// K/2 (J - 1)^2, shape apart from volume, as *HYPERELASTIC, NEO HOOKE has it. Both infinite where J <= 0.
 enum class ElasticLaw : int { linear, stvk, neo_hooke, neo_hooke_split };
-/// t4: linear tetrahedra; too stiff in bending, and lock as Poisson's ratio nears a half. t10: quadratic, straight edges at rest, 4 Gauss points.
+/// t4: linear tetrahedra; too stiff in bending, and lock as Poisson's ratio nears a half. t10: quadratic, straight edges at rest, 4 Gauss
+/// points.
 enum class TetOrder : int { t4, t10 };
 
 /// A body of tetrahedra with one material a tetrahedron. Points are mm at rest; of t10 the corners come first, as in the mesh.
 class FemBody final : public Energy {
  public:
-  /// Errors: usage for a Poisson's ratio outside (-1, 0.5), a modulus not above 0, an index out of range; corrupt for a tetrahedron of volume
+  /// Errors: usage for a Poisson's ratio outside (-1, 0.5), a modulus not above 0, an index out of range; corrupt for a tetrahedron of
+  /// volume
   /// <= 0. `materials`: one for all, or one a tetrahedron.
-  FemBody(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets, std::vector<Material> materials, ElasticLaw law,
-          TetOrder order);
+  FemBody(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets, std::vector<Material> materials,
+          ElasticLaw law, TetOrder order);
 
   [[nodiscard]] std::size_t point_count() const override { return rest_.size(); }
   [[nodiscard]] std::size_t element_count() const override { return count_; }

@@ -24,6 +24,7 @@ namespace osteo {
 /// Or an input file of Abaqus or CalculiX, with mm, N and MPa, whose mesh `mesh` is (load_tets): *ELASTIC or *HYPERELASTIC, NEO HOOKE by
 /// *SOLID SECTION; *BOUNDARY without movement; each *STEP a load of *CLOAD and *DLOAD (P1 to P4), NLGEOM says which law.
 struct TissueProblem {
+  Material general;                  ///< of what no region has
   std::vector<Material> materials;   ///< one a tetrahedron, or one for all
   std::vector<std::uint32_t> fixed;  ///< points
   std::vector<Slider> sliders;
@@ -40,6 +41,7 @@ struct TissueProblem {
 /// there.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 /// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
+/// Constants that were learnt without the regions ("base") stand on one material.
 [[nodiscard]] TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem,
                                            const std::optional<std::string>& constants_json = std::nullopt);
 

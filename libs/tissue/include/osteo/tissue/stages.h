@@ -53,8 +53,11 @@ struct CalibrateParams {
   OrderChoice order = OrderChoice::automatic;
   int grid_x = 1, grid_y = 1, grid_z = 1;
   bool shared_grid = true;
+  bool blind = false;
   double pull = 0.02;
+  double smooth = 0.05;
   int starts = 1;
+  int samples = 0;
   int iterations = 60;
 };
 struct CalibrateStage {
@@ -67,32 +70,55 @@ struct CalibrateStage {
     visit({"grid_y", "along y", "", 1, 20}, p.grid_y);
     visit({"grid_z", "along z", "", 1, 20}, p.grid_z);
     visit({"shared_grid", "one map for all kinds of constraint, and one factor a kind; else a map for each kind"}, p.shared_grid);
+    visit({"blind", "the model is not told of the problem's regions: a map has to find them"}, p.blind);
     visit({"pull", "towards the closed form: what the loads do not tell stays there", "", 0, 10}, p.pull);
+    visit({"smooth", "what differences in a shared map cost; borders between tissues cost less than ripples", "", 0, 10}, p.smooth);
     visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
+    visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000}, p.samples);
     visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
+enum class TimeMethod : int { explicit_steps, implicit_steps };
+template <>
+struct EnumNames<TimeMethod> {
+  static constexpr std::array<std::string_view, 2> values{"explicit", "implicit"};
+};
+
 struct SimulateParams {
   std::string load;
+  TimeMethod method = TimeMethod::explicit_steps;
   double seconds = 3;
   double density_kg_m3 = 1000;
   double damping_per_s = 60;
   double least_step_ms = 0;
+  double step_ms = 10;
   bool until_rest = true;
+  double tool_radius_mm = 0;
+  std::array<double, 3> tool_from_mm{}, tool_to_mm{};
+  double tool_stiffness_n_per_mm = 0.3;
+  double obstacle_stiffness_n_per_mm = 1;
 };
 struct SimulateStage {
   using Params = SimulateParams;
   static void describe(Params& p, auto& visit) {
-    visit({"load", "name of the load (empty: the first)"}, p.load);
+    visit({"load", "name of the load (empty: the first; none: no load)"}, p.load);
+    visit({"method", "explicit: many quick steps of a certified length; implicit: few long ones, for stiff bodies"}, p.method);
     visit({"seconds", "of simulated time, at most", "s", 1e-4, 1000}, p.seconds);
     visit({"density_kg_m3", "of the tissue", "kg/m3", 1, 30000}, p.density_kg_m3);
     visit({"damping_per_s", "how fast motion dies down", "1/s", 0, 1e5}, p.damping_per_s);
     visit({"least_step_ms", "steps at least this long: points are made heavier for it (0: as long as is stable)", "ms", 0, 100},
           p.least_step_ms);
+    visit({"step_ms", "implicit: length of a step, any", "ms", 1e-4, 1e5}, p.step_ms);
     visit({"until_rest", "ends when the forces balance to a thousandth of the load and little moves"}, p.until_rest);
+    visit({"tool_radius_mm", "a ball that is pushed into the body (0: none)", "mm", 0, 1e6}, p.tool_radius_mm);
+    visit({"tool_from_mm", "where its centre begins, LPS", "mm", -1e6, 1e6}, p.tool_from_mm);
+    visit({"tool_to_mm", "where it is after half of the time, and stays", "mm", -1e6, 1e6}, p.tool_to_mm);
+    visit({"tool_stiffness_n_per_mm", "of each point that it meets", "N/mm", 1e-9, 1e9}, p.tool_stiffness_n_per_mm);
+    visit({"obstacle_stiffness_n_per_mm", "of each point of the surface that meets the obstacle", "N/mm", 1e-9, 1e9},
+          p.obstacle_stiffness_n_per_mm);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -23,16 +23,16 @@ class TissueModel final : public Energy {
     std::array<std::uint32_t, 8> node{};  ///< 2, 3, 4 or 8 (the corners of a voxel) of them
     std::uint8_t nodes = 2;
     TissueClass kind = TissueClass::axis_edge;
-    double rest = 0;      ///< q0: mm, mm2, mm3
-    double stiffness = 0; ///< k in N mm
+    double rest = 0;          ///< q0: mm, mm2, mm3
+    double stiffness = 0;     ///< k in N mm
     std::uint32_t voxel = 0;  ///< of volumes of 8 nodes: which of the splits (0 or 1); else unused
   };
 
-  /// Of a mesh of grid_tets(): five tetrahedra a voxel in alternating ways. In closed form, without any simulation, from a material for each
-  /// voxel (or one for all): with edge h, each voxel gives mu h^3 / 4 to each of its 12 edges, 2 mu h^3 to each of its 6 diagonals and
-  /// (lambda - mu) h^3 to its volume. The sum is exactly isotropic linear elasticity for small strains; Poisson's ratio at least 1/4 (below,
-  /// the volume's share would be negative). One volume constraint a voxel, not one a tetrahedron, so nothing locks near a half. With
-  /// `faces` area constraints are there too, of stiffness 0 until calibration gives them some. Errors: usage when the mesh is not of
+  /// Of a mesh of grid_tets(): five tetrahedra a voxel in alternating ways. In closed form, without any simulation, from a material for
+  /// each voxel (or one for all): with edge h, each voxel gives mu h^3 / 4 to each of its 12 edges, 2 mu h^3 to each of its 6 diagonals and
+  /// (lambda - mu) h^3 to its volume. The sum is exactly isotropic linear elasticity for small strains; Poisson's ratio at least 1/4
+  /// (below, the volume's share would be negative). One volume constraint a voxel, not one a tetrahedron, so nothing locks near a half.
+  /// With `faces` area constraints are there too, of stiffness 0 until calibration gives them some. Errors: usage when the mesh is not of
   /// that kind, or for materials out of range.
   static TissueModel of_voxels(std::span<const Vec3> points_mm, std::span<const std::array<std::uint32_t, 4>> tets,
                                std::span<const Material> materials, bool faces = true);

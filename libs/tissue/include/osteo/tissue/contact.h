@@ -1,0 +1,57 @@
+// Rigid things that tissue does not enter: tools, bone.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "osteo/base/context.h"
+#include "osteo/data/tri_mesh.h"
+
+namespace osteo {
+
+/// Immutable as far as threads see it.
+class RigidShape {
+ public:
+  struct Ball {
+    Vec3 centre_mm;
+    double radius_mm = 0;
+  };
+  virtual ~RigidShape() = default;
+  /// A ball that holds it.
+  [[nodiscard]] virtual Ball bounds() const = 0;
+  /// Signed distance, negative inside, and its gradient (of length about 1, 0 where it has none). Beyond its bounds any number above 0 will
+  /// do.
+  virtual double distance_mm(Vec3 at, Vec3& outwards) const = 0;
+};
+
+class BallShape final : public RigidShape {
+ public:
+  BallShape(Vec3 centre_mm, double radius_mm) : ball_{centre_mm, radius_mm} {}
+  [[nodiscard]] Ball bounds() const override { return ball_; }
+  double distance_mm(Vec3 at, Vec3& outwards) const override;
+
+ private:
+  Ball ball_;
+};
+
+/// A closed surface by its distance map (exact at the map's points, linear between) over a box; outside the box it is not felt.
+class SurfaceShape final : public RigidShape {
+ public:
+  /// O(voxels of the box). Errors: usage for a box of more than 200 million voxels, and as of DistanceMapper.
+  SurfaceShape(const TriMesh& surface, Vec3 lo_mm, Vec3 hi_mm, double spacing_mm, const Context& context = {});
+  [[nodiscard]] Ball bounds() const override;
+  double distance_mm(Vec3 at, Vec3& outwards) const override;
+
+ private:
+  Vec3 lo_;
+  double spacing_;
+  std::array<std::size_t, 3> dims_{};
+  std::vector<float> distance_;  // x fastest
+};
+
+/// A shape and how hard it pushes: a point inside feels stiffness times depth along the shortest way out.
+struct RigidContact {
+  std::shared_ptr<const RigidShape> shape;  ///< null: none
+  double stiffness_n_per_mm = 1;
+};
+
+}  // namespace osteo
