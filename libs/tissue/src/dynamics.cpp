@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "body_parts.h"
+#include "cutter.h"
 #include "dynamics_kernel.h"
 #include "osteo/base/error.h"
 
@@ -92,6 +93,7 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Plane> planes;
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
   std::uint64_t steps = 0;
+  std::unique_ptr<Cutter> cutter;  // once something was cut
   double load_size = 0;
   int met = 0;
   Counts counts;
@@ -259,12 +261,25 @@ void TissueDynamics<Real>::set_position(std::uint32_t p, Vec3 at) {
 }
 
 template <class Real>
-void TissueDynamics<Real>::remove_constraints(std::span<const std::uint32_t> constraints) {
+void TissueDynamics<Real>::cut_off(std::span<const std::uint32_t> tets) {
   Impl& m = *impl_;
-  for (const std::uint32_t c : constraints) {
-    if (c < m.model.element_count()) m.model.set_stiffness(c, 0);
-  }
+  if (!m.cutter) m.cutter = std::make_unique<Cutter>(m.model);
+  m.cutter->cut(m.model, tets);
   m.lay_out();  // what is gone only lowers the frequencies: the step stays
+  std::vector<bool> outside(m.x.size());
+  for (const std::uint32_t p : m.surface) outside[p] = true;
+  for (const std::uint32_t t : tets) {
+    if (t >= m.model.tets().size()) continue;
+    for (const std::uint32_t p : m.model.tets()[t]) {
+      if (outside[p]) continue;
+      outside[p] = true;
+      m.surface.push_back(p);
+      if (m.obstacle.shape) m.allowed.push_back(depths_at_rest(*m.obstacle.shape, m.model.rest(), std::span(&p, 1)).front());
+    }
+  }
+  for (std::uint32_t p = 0; p < m.x.size(); ++p) {
+    if (m.cutter->tets_of_point(p) == 0) m.inverse_mass[p] = 0;
+  }
 }
 
 template <class Real>
@@ -307,7 +322,7 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
                r = static_cast<Real>(near.radius_mm);
     for (std::uint32_t p = 0; p < x.size(); ++p) {
       const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz;
-      if (!(dx * dx + dy * dy + dz * dz < r * r)) continue;
+      if (!(dx * dx + dy * dy + dz * dz < r * r) || (cutter && cutter->tets_of_point(p) == 0)) continue;
       Vec3 out;
       const double d = tool.shape->distance_mm({static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}, out);
       if (!(d < 0) || out == Vec3{}) continue;

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "body_parts.h"
+#include "cutter.h"
 #include "osteo/base/error.h"
 
 namespace osteo {
@@ -17,7 +18,7 @@ namespace {
 class Incremental final : public Energy {
  public:
   explicit Incremental(const TissueModel& m)
-      : model(m), weight(m.point_count()), target(m.rest()), allowed(m.point_count(), 1), own_(m.point_count()) {
+      : model(m), weight(m.point_count()), target(m.rest()), allowed(m.point_count(), 1), met(m.point_count(), true), own_(m.point_count()) {
     std::iota(own_.begin(), own_.end(), 0U);
   }
   [[nodiscard]] std::size_t point_count() const override { return model.point_count(); }
@@ -36,8 +37,8 @@ class Incremental final : public Energy {
     if (hessian != nullptr) {
       for (std::size_t i = 0; i < 9; ++i) hessian[i] = i % 4 == 0 ? weight[p] : 0;
     }
-    energy += pushed(tool, 0, x[0], gradient, hessian);
-    if (allowed[p] <= 0) energy += pushed(obstacle, allowed[p], x[0], gradient, hessian);
+    if (met[p]) energy += pushed(tool, 0, x[0], gradient, hessian);
+    if (met[p] && allowed[p] <= 0) energy += pushed(obstacle, allowed[p], x[0], gradient, hessian);
     return energy;
   }
   // k/2 depth^2.
@@ -60,6 +61,7 @@ class Incremental final : public Energy {
   std::vector<double> weight;
   std::vector<Vec3> target;
   std::vector<double> allowed;  // of points that the obstacle meets, at most 0; 1: not met
+  std::vector<bool> met;        // by tool or obstacle at all
   RigidContact tool, obstacle;
 
  private:
@@ -77,6 +79,7 @@ struct ImplicitDynamics::Impl {
   std::vector<std::uint8_t> held;
   std::vector<std::uint32_t> surface;
   double load_size = 0;
+  std::unique_ptr<Cutter> cutter;  // once something was cut
   Counts counts;
 
   Impl(const TissueModel& m, std::span<const std::uint32_t> fixed, const ImplicitOptions& o, std::span<const Slider> sliders)
@@ -139,9 +142,15 @@ void ImplicitDynamics::set_position(std::uint32_t p, Vec3 at) {
   impl_->v[p] = {};
 }
 
-void ImplicitDynamics::remove_constraints(std::span<const std::uint32_t> constraints) {
-  for (const std::uint32_t c : constraints) {
-    if (c < impl_->energy.model.element_count()) impl_->energy.model.set_stiffness(c, 0);
+void ImplicitDynamics::cut_off(std::span<const std::uint32_t> tets) {
+  Impl& m = *impl_;
+  if (!m.cutter) m.cutter = std::make_unique<Cutter>(m.energy.model);
+  m.cutter->cut(m.energy.model, tets);
+  for (std::uint32_t p = 0; p < m.x.size(); ++p) {
+    if (m.mass[p] > 0 && m.cutter->tets_of_point(p) == 0) {
+      m.energy.met[p] = false;
+      m.load[p] = m.v[p] = {};
+    }
   }
 }
 
@@ -160,9 +169,10 @@ Vec3 ImplicitDynamics::step(int steps) {
     m.x = r.points_mm;
   }
   Vec3 on_tool{};
-  for (const Vec3& p : m.x) {
+  for (std::size_t p = 0; p < m.x.size(); ++p) {
+    if (!m.energy.met[p]) continue;
     double g[3] = {};
-    Incremental::pushed(m.energy.tool, 0, p, g, nullptr);
+    Incremental::pushed(m.energy.tool, 0, m.x[p], g, nullptr);
     on_tool += Vec3{g[0], g[1], g[2]};
   }
   return on_tool;
@@ -185,6 +195,7 @@ double ImplicitDynamics::residual() const {
   double most = 0;
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     double push[3] = {};
+    if (!m.energy.met[p]) continue;
     Incremental::pushed(m.energy.tool, 0, m.x[p], push, nullptr);
     if (m.energy.allowed[p] <= 0) Incremental::pushed(m.energy.obstacle, m.energy.allowed[p], m.x[p], push, nullptr);
     most = std::max(most, length(m.of_free(p, m.load[p] - g[p] - Vec3{push[0], push[1], push[2]})));

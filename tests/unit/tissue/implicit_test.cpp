@@ -169,6 +169,50 @@ TEST(Implicit, ToolAndObstacleAsExplicitStepsFindThem) {
   EXPECT_EQ(quick.counts().softened, 0u);
 }
 
+// What is left after a cut is what would have been made without the part that went; both ways in time.
+TEST(Implicit, CutOffItIsTheBodyThatIsLeft) {
+  const auto whole = block(3, 3, 5, 2.0), left = block(3, 3, 5, 2.0, [](Vec3 p) { return !(p.z > 4 && p.x > 4); });
+  const Material m{0.05, 0.45};
+  const TissueModel model = model_of(whole, m), fresh = model_of(left, m);
+  std::vector<std::uint32_t> gone;
+  for (std::uint32_t t = 0; t < whole.tets.size(); ++t) {
+    Vec3 c{};
+    for (const std::uint32_t p : whole.tets[t / 5 * 5]) c += whole.points[p] / 4;
+    if (c.z > 4 && c.x > 4) gone.push_back(t);
+  }
+  EXPECT_EQ(whole.tets.size() - gone.size(), left.tets.size());
+  const auto fixed = base_of(whole), fixed_left = base_of(left);
+  const auto pulled = [](const test::Block& b) {
+    std::vector<std::pair<std::uint32_t, Vec3>> load;
+    for (std::uint32_t p = 0; p < b.points.size(); ++p) {
+      if (b.points[p].z > 9.9 && b.points[p].x < 2.1) load.push_back({p, {0.002, 0, 0.001}});
+    }
+    return load;
+  };
+  EquilibriumSolver solver(fresh, fresh.rest(), fixed_left);
+  const Equilibrium exact = solver.solve(fresh, fresh.rest(), pulled(left));
+  ASSERT_TRUE(exact.converged);
+  ImplicitDynamics slow(model, fixed, {.step_s = 1});
+  TissueDynamics<double> quick(model, fixed, {.damping_per_s = 300});
+  slow.set_load(pulled(whole));
+  quick.set_load(pulled(whole));
+  slow.step(3);
+  quick.step(500);
+  for (const std::uint32_t t : gone) {  // one by one
+    slow.cut_off(std::span(&t, 1));
+    quick.cut_off(std::span(&t, 1));
+  }
+  slow.step(6);
+  quick.step(40000);
+  for (std::uint32_t p = 0; p < left.points.size(); ++p) {
+    for (std::uint32_t q = 0; q < whole.points.size(); ++q) {
+      if (length(whole.points[q] - left.points[p]) > 1e-9) continue;
+      EXPECT_LT(length(slow.positions_mm()[q] - exact.points_mm[p]), 1e-5);
+      EXPECT_LT(length(quick.positions_mm()[q] - exact.points_mm[p]), 1e-3);
+    }
+  }
+}
+
 TEST(Implicit, InvertedAndTeleported) {
   const auto b = block(4, 4, 3, 2.0);
   const TissueModel model = model_of(b, {0.05, 0.45});

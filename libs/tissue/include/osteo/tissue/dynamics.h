@@ -36,8 +36,9 @@ class TissueDynamics {
   /// it at rest may stay as deep.
   void set_obstacle(RigidContact obstacle);
   void set_position(std::uint32_t point, Vec3 at_mm);
-  /// Cuts off tetrahedra: their voxels' constraints go, without a restart. O(constraints).
-  void remove_constraints(std::span<const std::uint32_t> constraints);
+  /// Cuts off tetrahedra (their numbers in the model), without a restart: what they held goes, what they shared gets weaker. A point of
+  /// which nothing is left stays where it is and meets nothing. O(constraints).
+  void cut_off(std::span<const std::uint32_t> tets);
 
   /// Returns the force on the tool in the last step, N.
   Vec3 step(int steps = 1);

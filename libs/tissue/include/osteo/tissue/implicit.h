@@ -32,7 +32,7 @@ class ImplicitDynamics {
   void set_tool(RigidContact tool);          ///< meets all points
   void set_obstacle(RigidContact obstacle);  ///< meets the surface; points that lie in it at rest may stay as deep
   void set_position(std::uint32_t point, Vec3 at_mm);
-  void remove_constraints(std::span<const std::uint32_t> constraints);
+  void cut_off(std::span<const std::uint32_t> tets);  ///< as of TissueDynamics
 
   /// Returns the force on the tool at the end of the step, N.
   Vec3 step(int steps = 1);
