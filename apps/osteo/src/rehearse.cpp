@@ -318,7 +318,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
       soft = soft_body_of(the_case.folder);
       return soft->memory_bytes();
     });
-    if (soft->slow_motion() < 1)
+    if (soft->slow_motion() < 0.99)
       io.context.warn("soft tissue runs at " + format_number(std::round(100 * soft->slow_motion())) + " % of real time");
   }
   std::unique_ptr<HapticRenderer> renderer;

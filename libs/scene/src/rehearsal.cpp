@@ -26,6 +26,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
   if (options_.follow.surface || options_.follow.pieces || options_.follow.dust || options_.soft) reader_ = &stream_.add_reader();
   follower_ = std::make_unique<Follower>(operation_.world(), options_.follow, options_.rate_hz, context);
   pieces_ = static_cast<int>(follower_->large_pieces().size());
+  if (options_.soft) options_.soft->meet(&operation_.world());
 }
 
 Rehearsal::~Rehearsal() {
@@ -33,6 +34,7 @@ Rehearsal::~Rehearsal() {
   if (loop_) loop_->join();
   stop_ = true;
   if (thread_.joinable()) thread_.join();
+  if (options_.soft) options_.soft->meet(nullptr);
 }
 
 bool Rehearsal::running() const {
@@ -62,7 +64,7 @@ void Rehearsal::perform(const SceneAction& action, bool live) {
     drain();
     effect = operation_.act(action, done, components);
   }
-  if (options_.follow.pieces) pieces_ = static_cast<int>(follower_->large_pieces().size());
+  if (options_.follow.pieces && !action.is(ActionKind::yield)) pieces_ = static_cast<int>(follower_->large_pieces().size());
   if (!effect.done) {
     const std::lock_guard lock(queue_mutex_);
     refused_ = std::string(name_of(static_cast<ActionKind>(action.kind))) + ": " + effect.message;
@@ -75,7 +77,8 @@ std::optional<SceneAction> Rehearsal::move_soft() {
   const TickRecord& now = follower_->latest();
   if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
-  return options_.soft->update(from_floats(now.device.position_mm), burr_library()[now.device.tool].head().largest_radius_mm());
+  return options_.soft->update(
+      {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.device.drill_on != 0});
 }
 
 void Rehearsal::act(const SceneAction& action) {

@@ -27,11 +27,13 @@ std::vector<std::uint32_t> points_of_boundary(const TissueModel& model) {
   return points;
 }
 
-std::vector<double> depths_at_rest(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points) {
-  std::vector<double> depths;
+std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points) {
+  std::vector<std::uint32_t> inside;
   Vec3 out;
-  for (const std::uint32_t p : points) depths.push_back(std::min(0.0, shape.distance_mm(rest[p], out)));
-  return depths;
+  for (const std::uint32_t p : points) {
+    if (shape.distance_mm(rest[p], out) < 0) inside.push_back(p);
+  }
+  return inside;
 }
 
 }  // namespace osteo::tissue

@@ -13,7 +13,7 @@ namespace osteo::tissue {
 std::vector<double> masses(const TissueModel& model, double density_kg_m3);
 /// In ascending order.
 std::vector<std::uint32_t> points_of_boundary(const TissueModel& model);
-/// Of each point: how far it lies inside the shape at rest (below 0), or 0.
-std::vector<double> depths_at_rest(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points);
+/// Those of the points that lie inside the shape at rest.
+std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points);
 
 }  // namespace osteo::tissue

@@ -5,8 +5,7 @@
 
 namespace osteo::tissue {
 
-Cutter::Cutter(const TissueModel& whole)
-    : there_(whole.tets().size(), true), of_point_(whole.point_count()), had_(whole.element_count()) {
+Cutter::Cutter(const TissueModel& whole) : there_(whole.tets().size(), true), of_point_(whole.point_count()), had_(whole.element_count()) {
   std::map<std::array<std::uint32_t, 4>, std::uint32_t> by_points;  // edges, faces and single tetrahedra, sorted, padded with the last
   std::vector<std::uint32_t> voxels;
   const auto key = [](std::span<const std::uint32_t> nodes) {

@@ -10,6 +10,8 @@
 #include "cutter.h"
 #include "dynamics_kernel.h"
 #include "osteo/base/error.h"
+#include "osteo/data/tet_mesh.h"
+#include "osteo/distance/triangle_tree.h"
 
 namespace osteo {
 
@@ -60,7 +62,7 @@ tissue::ForceFunction<Real> force_function() {
 
 // Stretched or sheared, edges are stiffer against their length than at rest by their strain: so much is allowed for.
 constexpr double kStretchMargin = 1.25;
-constexpr std::uint64_t kObstacleSteps = 10;
+constexpr std::uint64_t kObstacleSteps = 10, kTieSteps = 200;
 
 }  // namespace
 
@@ -84,7 +86,9 @@ struct TissueDynamics<Real>::Impl {
   tissue::Arrays<Real> arrays;
   RigidContact tool, obstacle;
   std::vector<std::uint32_t> surface;  // points of the body's boundary
-  std::vector<double> allowed;         // of each of them: how deep it lies in the obstacle at rest, below 0
+  std::vector<bool> surface_point;     // of all points
+  std::vector<bool> tied;              // of all points: to its place in the obstacle
+  std::vector<std::uint32_t> ties;     // those
   struct Plane {
     std::uint32_t point;
     Vec3 normal;
@@ -92,7 +96,7 @@ struct TissueDynamics<Real>::Impl {
   };
   std::vector<Plane> planes;
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
-  std::uint64_t steps = 0;
+  std::uint64_t steps = 0, tool_steps = 0;
   std::unique_ptr<Cutter> cutter;  // once something was cut
   double load_size = 0;
   int met = 0;
@@ -102,9 +106,29 @@ struct TissueDynamics<Real>::Impl {
   void lay_out();
   double certify();
   Vec3 forces();
-  // Forces of contact with shape: `deep` above 0, pushed along `out`; returns what acts on the point.
-  Vec3 push(std::uint32_t p, double stiffness, double deep, Vec3 out);
+  // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
+  [[nodiscard]] double room(std::uint32_t p) const {
+    return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
+  }
+  // The obstacle on a point: `deep` above 0, along `out`.
+  void push(std::uint32_t p, double deep, Vec3 out);
+  void add(std::uint32_t p, Vec3 f) {
+    fx[p] += static_cast<Real>(f.x);
+    fy[p] += static_cast<Real>(f.y);
+    fz[p] += static_cast<Real>(f.z);
+  }
+  [[nodiscard]] Vec3 at(std::uint32_t p) const { return {static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}; }
   void find_planes();
+  // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
+  // too.
+  std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
+  std::vector<std::uint32_t> near_triangles, near_points;  // those that the tool may reach before it is looked for again
+  std::vector<RigidShape::Ball> tool_balls;
+  void lay_triangles();
+  void find_near();
+  Vec3 push_by_tool();
+  // Points whose place in the obstacle is gone.
+  void untie();
 };
 
 template <class Real>
@@ -208,6 +232,8 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
   for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
   m.lay_out();
   m.surface = points_of_boundary(model);
+  m.surface_point.assign(n, false);
+  for (const std::uint32_t p : m.surface) m.surface_point[p] = true;
   for (const auto& t : model.tets()) m.margin = std::max(m.margin, 0.25 * length(model.rest()[t[1]] - model.rest()[t[0]]));
   m.dt = m.certify();
   m.inverse_mass.assign(n, 0);
@@ -239,6 +265,9 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
 template <class Real>
 void TissueDynamics<Real>::set_tool(RigidContact tool) {
   impl_->tool = std::move(tool);
+  impl_->tool_steps = 0;
+  impl_->tool_balls = impl_->tool.shape ? impl_->tool.shape->balls() : std::vector<RigidShape::Ball>{};
+  if (!impl_->tool_balls.empty() && impl_->triangles.empty()) impl_->lay_triangles();
 }
 
 template <class Real>
@@ -246,10 +275,12 @@ void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
   Impl& m = *impl_;
   m.obstacle = std::move(obstacle);
   m.planes.clear();
-  m.allowed.clear();
+  m.ties.clear();
+  m.tied.assign(m.x.size(), false);
   m.steps = 0;
   if (!m.obstacle.shape) return;
-  m.allowed = depths_at_rest(*m.obstacle.shape, m.model.rest(), m.surface);
+  m.ties = points_inside(*m.obstacle.shape, m.model.rest(), m.surface);
+  for (const std::uint32_t p : m.ties) m.tied[p] = true;
 }
 
 template <class Real>
@@ -266,44 +297,121 @@ void TissueDynamics<Real>::cut_off(std::span<const std::uint32_t> tets) {
   if (!m.cutter) m.cutter = std::make_unique<Cutter>(m.model);
   m.cutter->cut(m.model, tets);
   m.lay_out();  // what is gone only lowers the frequencies: the step stays
-  std::vector<bool> outside(m.x.size());
-  for (const std::uint32_t p : m.surface) outside[p] = true;
   for (const std::uint32_t t : tets) {
     if (t >= m.model.tets().size()) continue;
     for (const std::uint32_t p : m.model.tets()[t]) {
-      if (outside[p]) continue;
-      outside[p] = true;
+      if (m.surface_point[p]) continue;
+      m.surface_point[p] = true;
       m.surface.push_back(p);
-      if (m.obstacle.shape) m.allowed.push_back(depths_at_rest(*m.obstacle.shape, m.model.rest(), std::span(&p, 1)).front());
     }
   }
   for (std::uint32_t p = 0; p < m.x.size(); ++p) {
     if (m.cutter->tets_of_point(p) == 0) m.inverse_mass[p] = 0;
   }
+  if (!m.triangles.empty()) m.lay_triangles();
+  m.tool_steps = 0;
 }
 
 template <class Real>
-Vec3 TissueDynamics<Real>::Impl::push(std::uint32_t p, double stiffness, double deep, Vec3 out) {
-  // What the certified step leaves room for: with it omega dt stays below 2 in all.
-  const double most = 0.5 * mass[p] / (dt * dt);
-  if (stiffness > most) ++counts.softened;
-  const Vec3 f = out * (std::min(stiffness, most) * deep);
-  fx[p] += static_cast<Real>(f.x);
-  fy[p] += static_cast<Real>(f.y);
-  fz[p] += static_cast<Real>(f.z);
-  return f;
+void TissueDynamics<Real>::Impl::push(std::uint32_t p, double deep, Vec3 out) {
+  const double most = room(p);
+  if (obstacle.stiffness_n_per_mm > most) ++counts.softened;
+  add(p, out * (std::min(obstacle.stiffness_n_per_mm, most) * deep));
+}
+
+template <class Real>
+void TissueDynamics<Real>::Impl::lay_triangles() {
+  TetMesh mesh;
+  for (const Vec3& p : model.rest()) mesh.points_mm.push_back(to_floats(p));
+  for (std::uint32_t t = 0; t < model.tets().size(); ++t) {
+    if (!cutter || cutter->there(t)) mesh.tets.push_back(model.tets()[t]);
+  }
+  std::vector<std::uint32_t> point_of;
+  const TriMesh boundary = boundary_of(mesh, &point_of);
+  triangles.clear();
+  for (const auto& t : boundary.triangles) triangles.push_back({point_of[t[0]], point_of[t[1]], point_of[t[2]]});
+}
+
+template <class Real>
+void TissueDynamics<Real>::Impl::find_near() {
+  near_triangles.clear();
+  near_points.clear();
+  const RigidShape::Ball ball = tool.shape->bounds();
+  // Triangles reach beyond their first point, and things move.
+  const double reach = ball.radius_mm + 8 * margin;
+  const auto close = [&](std::uint32_t p) {
+    const Vec3 off = at(p) - ball.centre_mm;
+    return dot(off, off) < reach * reach;
+  };
+  for (std::uint32_t p = 0; p < x.size(); ++p) {
+    if (mass[p] > 0 && close(p) && !(cutter && cutter->tets_of_point(p) == 0)) near_points.push_back(p);
+  }
+  for (std::uint32_t t = 0; t < triangles.size() && !tool_balls.empty(); ++t) {
+    if (close(triangles[t][0])) near_triangles.push_back(t);
+  }
+}
+
+template <class Real>
+Vec3 TissueDynamics<Real>::Impl::push_by_tool() {
+  Vec3 on_tool{};
+  // A point has about six triangles, each of which may push all of it; and itself.
+  const auto stiffness = [&](double most) {
+    if (tool.stiffness_n_per_mm > most / 7) ++counts.softened;
+    return std::min(tool.stiffness_n_per_mm, most / 7);
+  };
+  for (const std::uint32_t p : near_points) {
+    Vec3 out;
+    const double d = tool.shape->distance_mm(at(p), out);
+    if (!(d < 0) || (surface_point[p] && !tool_balls.empty())) continue;
+    ++met;
+    const Vec3 f = out * (stiffness(room(p)) * -d);
+    add(p, f);
+    on_tool -= f;
+  }
+  for (const std::uint32_t t : near_triangles) {
+    const auto& q = triangles[t];
+    const Vec3 a = at(q[0]), u = at(q[1]) - a, v = at(q[2]) - a, area = cross(u, v);
+    const double square = dot(area, area);
+    if (!(square > 0)) continue;
+    for (const RigidShape::Ball& ball : tool_balls) {
+      const ClosestPoint c = closest_on_triangle(ball.centre_mm, a, a + u, a + v);
+      if (!(c.distance_mm < ball.radius_mm) || !(c.distance_mm > 0)) continue;
+      ++met;
+      Vec3 out = (c.point_mm - ball.centre_mm) / c.distance_mm;
+      // A tool outside pushes the surface inwards. Where its nearest side lies the other way it has sunk in by more than half: without this
+      // the surface would slip past it.
+      const Vec3 normal = area / std::sqrt(square);
+      out -= normal * (2 * std::max(0.0, dot(out, normal)));
+      const Vec3 f = out * (stiffness(std::min({room(q[0]), room(q[1]), room(q[2])})) * (ball.radius_mm - c.distance_mm));
+      const Vec3 w = c.point_mm - a;
+      const double b1 = dot(cross(w, v), area) / square, b2 = dot(cross(u, w), area) / square;
+      add(q[0], f * (1 - b1 - b2));
+      add(q[1], f * b1);
+      add(q[2], f * b2);
+      on_tool -= f;
+    }
+  }
+  return on_tool;
+}
+
+template <class Real>
+void TissueDynamics<Real>::Impl::untie() {
+  const auto still = points_inside(*obstacle.shape, model.rest(), ties);
+  if (still.size() == ties.size()) return;
+  for (const std::uint32_t p : ties) tied[p] = false;
+  for (const std::uint32_t p : still) tied[p] = true;
+  ties = still;
 }
 
 template <class Real>
 void TissueDynamics<Real>::Impl::find_planes() {
   planes.clear();
-  for (std::size_t n = 0; n < surface.size(); ++n) {
-    const std::uint32_t p = surface[n];
-    if (inverse_mass[p] == 0) continue;
-    const Vec3 at{static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])};
+  for (const std::uint32_t p : surface) {
+    if (inverse_mass[p] == 0 || tied[p]) continue;
+    const Vec3 here = at(p);
     Vec3 out;
-    const double d = obstacle.shape->distance_mm(at, out) - allowed[n];
-    if (d < margin) planes.push_back({p, out, dot(out, at) - d});
+    const double d = obstacle.shape->distance_mm(here, out);
+    if (d < margin) planes.push_back({p, out, dot(out, here) - d});
   }
 }
 
@@ -316,24 +424,13 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   function(arrays);
   Vec3 on_tool{};
   met = 0;
-  if (tool.shape) {
-    const RigidShape::Ball near = tool.shape->bounds();
-    const Real cx = static_cast<Real>(near.centre_mm.x), cy = static_cast<Real>(near.centre_mm.y), cz = static_cast<Real>(near.centre_mm.z),
-               r = static_cast<Real>(near.radius_mm);
-    for (std::uint32_t p = 0; p < x.size(); ++p) {
-      const Real dx = x[p] - cx, dy = y[p] - cy, dz = z[p] - cz;
-      if (!(dx * dx + dy * dy + dz * dz < r * r) || (cutter && cutter->tets_of_point(p) == 0)) continue;
-      Vec3 out;
-      const double d = tool.shape->distance_mm({static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}, out);
-      if (!(d < 0) || out == Vec3{}) continue;
-      ++met;
-      on_tool -= push(p, tool.stiffness_n_per_mm, -d, out);
-    }
-  }
+  if (tool.shape) on_tool = push_by_tool();
   for (const Plane& q : planes) {
-    const double deep = q.offset - (q.normal.x * static_cast<double>(x[q.point]) + q.normal.y * static_cast<double>(y[q.point]) +
-                                    q.normal.z * static_cast<double>(z[q.point]));
-    if (deep > 0) push(q.point, obstacle.stiffness_n_per_mm, deep, q.normal);
+    const double deep = q.offset - dot(q.normal, at(q.point));
+    if (deep > 0) push(q.point, deep, q.normal);
+  }
+  for (const std::uint32_t p : ties) {
+    if (inverse_mass[p] != 0) push(p, 1, model.rest()[p] - at(p));
   }
   for (const Slider& q : sliders) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -348,7 +445,12 @@ Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
   Vec3 on_tool{};
   for (int s = 0; s < steps; ++s) {
-    if (m.obstacle.shape && m.steps++ % kObstacleSteps == 0) m.find_planes();
+    if (m.tool.shape && m.tool_steps++ % kObstacleSteps == 0) m.find_near();
+    if (m.obstacle.shape) {
+      if (m.steps % kObstacleSteps == 0) m.find_planes();
+      if (m.steps % kTieSteps == 0) m.untie();
+      ++m.steps;
+    }
     on_tool = m.forces();
     const Real a = static_cast<Real>(0.5 * m.options.damping_per_s * m.dt), keep = 1 - a, whole = 1 / (1 + a);
     const Real dt2 = static_cast<Real>(m.dt * m.dt);

@@ -18,7 +18,12 @@ namespace {
 class Incremental final : public Energy {
  public:
   explicit Incremental(const TissueModel& m)
-      : model(m), weight(m.point_count()), target(m.rest()), allowed(m.point_count(), 1), met(m.point_count(), true), own_(m.point_count()) {
+      : model(m),
+        weight(m.point_count()),
+        target(m.rest()),
+        by_obstacle(m.point_count(), Meets::nothing),
+        met(m.point_count(), true),
+        own_(m.point_count()) {
     std::iota(own_.begin(), own_.end(), 0U);
   }
   [[nodiscard]] std::size_t point_count() const override { return model.point_count(); }
@@ -37,18 +42,29 @@ class Incremental final : public Energy {
     if (hessian != nullptr) {
       for (std::size_t i = 0; i < 9; ++i) hessian[i] = i % 4 == 0 ? weight[p] : 0;
     }
-    if (met[p]) energy += pushed(tool, 0, x[0], gradient, hessian);
-    if (met[p] && allowed[p] <= 0) energy += pushed(obstacle, allowed[p], x[0], gradient, hessian);
+    if (met[p]) energy += pushed(tool, x[0], gradient, hessian);
+    if (met[p]) energy += held(p, x[0], gradient, hessian);
     return energy;
   }
+  // By the obstacle: pushed out of it, or tied to a place in it.
+  double held(std::size_t p, Vec3 x, double* gradient, double* hessian) const {
+    if (by_obstacle[p] == Meets::pushed) return pushed(obstacle, x, gradient, hessian);
+    if (by_obstacle[p] == Meets::nothing) return 0;
+    const Vec3 off = x - model.rest()[p];
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (gradient != nullptr) gradient[a] += obstacle.stiffness_n_per_mm * off[a];
+      if (hessian != nullptr) hessian[4 * a] += obstacle.stiffness_n_per_mm;
+    }
+    return 0.5 * obstacle.stiffness_n_per_mm * dot(off, off);
+  }
   // k/2 depth^2.
-  static double pushed(const RigidContact& by, double allowed, Vec3 x, double* gradient, double* hessian) {
+  static double pushed(const RigidContact& by, Vec3 x, double* gradient, double* hessian) {
     if (!by.shape) return 0;
     const RigidShape::Ball near = by.shape->bounds();
     const Vec3 to = x - near.centre_mm;
     if (!(dot(to, to) < near.radius_mm * near.radius_mm)) return 0;
     Vec3 out;
-    const double d = by.shape->distance_mm(x, out) - allowed;
+    const double d = by.shape->distance_mm(x, out);
     if (!(d < 0)) return 0;
     for (std::size_t a = 0; a < 3; ++a) {
       if (gradient != nullptr) gradient[a] += by.stiffness_n_per_mm * d * out[a];
@@ -60,8 +76,9 @@ class Incremental final : public Energy {
   TissueModel model;
   std::vector<double> weight;
   std::vector<Vec3> target;
-  std::vector<double> allowed;  // of points that the obstacle meets, at most 0; 1: not met
-  std::vector<bool> met;        // by tool or obstacle at all
+  enum class Meets : std::uint8_t { nothing, pushed, tied };
+  std::vector<Meets> by_obstacle;
+  std::vector<bool> met;  // by tool or obstacle at all
   RigidContact tool, obstacle;
 
  private:
@@ -131,10 +148,12 @@ void ImplicitDynamics::set_tool(RigidContact tool) {
 void ImplicitDynamics::set_obstacle(RigidContact obstacle) {
   Impl& m = *impl_;
   m.energy.obstacle = std::move(obstacle);
-  std::fill(m.energy.allowed.begin(), m.energy.allowed.end(), 1);
+  auto& meets = m.energy.by_obstacle;
+  std::fill(meets.begin(), meets.end(), Incremental::Meets::nothing);
   if (!m.energy.obstacle.shape) return;
-  const auto depths = depths_at_rest(*m.energy.obstacle.shape, m.energy.model.rest(), m.surface);
-  for (std::size_t n = 0; n < m.surface.size(); ++n) m.energy.allowed[m.surface[n]] = depths[n];
+  for (const std::uint32_t p : m.surface) meets[p] = Incremental::Meets::pushed;
+  for (const std::uint32_t p : points_inside(*m.energy.obstacle.shape, m.energy.model.rest(), m.surface))
+    meets[p] = Incremental::Meets::tied;
 }
 
 void ImplicitDynamics::set_position(std::uint32_t p, Vec3 at) {
@@ -172,7 +191,7 @@ Vec3 ImplicitDynamics::step(int steps) {
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     if (!m.energy.met[p]) continue;
     double g[3] = {};
-    Incremental::pushed(m.energy.tool, 0, m.x[p], g, nullptr);
+    Incremental::pushed(m.energy.tool, m.x[p], g, nullptr);
     on_tool += Vec3{g[0], g[1], g[2]};
   }
   return on_tool;
@@ -196,8 +215,8 @@ double ImplicitDynamics::residual() const {
   for (std::size_t p = 0; p < m.x.size(); ++p) {
     double push[3] = {};
     if (!m.energy.met[p]) continue;
-    Incremental::pushed(m.energy.tool, 0, m.x[p], push, nullptr);
-    if (m.energy.allowed[p] <= 0) Incremental::pushed(m.energy.obstacle, m.energy.allowed[p], m.x[p], push, nullptr);
+    Incremental::pushed(m.energy.tool, m.x[p], push, nullptr);
+    m.energy.held(p, m.x[p], push, nullptr);
     most = std::max(most, length(m.of_free(p, m.load[p] - g[p] - Vec3{push[0], push[1], push[2]})));
   }
   return most / (m.load_size > 0 ? m.load_size : 1);

@@ -100,22 +100,21 @@ void WorldView::update(const World& world, Follower& follower) {
   }
 }
 
-void WorldView::update_soft(const SoftBody& soft) {
-  if (!soft_actor_) {
-    soft_data_ = to_vtk(soft.surface());
+void WorldView::update_soft(SoftBody& soft) {
+  const TriMesh& mesh = soft.drawn();
+  if (!soft_actor_ || soft_version_ != soft.version()) {
+    if (soft_actor_) renderer_->RemoveActor(soft_actor_);
+    soft_version_ = soft.version();
+    soft_data_ = to_vtk(mesh);
     soft_actor_ = make_bone_actor(soft_data_);
     soft_actor_->GetProperty()->SetColor(0.80, 0.42, 0.40);
     soft_actor_->GetProperty()->SetSpecular(0.3);
     soft_actor_->GetMapper()->StaticOff();
     renderer_->AddActor(soft_actor_);
+    return;
   }
-  const auto points = soft.points_mm();
-  const auto of_surface = soft.points_of_surface();
   vtkPoints* const at = soft_data_->GetPoints();
-  for (std::size_t p = 0; p < of_surface.size(); ++p) {
-    const Vec3 x = points[of_surface[p]];
-    at->SetPoint(static_cast<vtkIdType>(p), x.x, x.y, x.z);
-  }
+  for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) at->SetPoint(static_cast<vtkIdType>(p), mesh.points_mm[p].data());
   at->Modified();
   soft_data_->Modified();
 }
@@ -208,7 +207,7 @@ void WorldView::rest(int width, int height) {
   });
 }
 
-Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p, const SoftBody* soft) {
+Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p, SoftBody* soft) {
   OffscreenWindow window(p.width, p.height);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);

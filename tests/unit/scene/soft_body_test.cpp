@@ -86,6 +86,80 @@ TEST(SoftBody, PushesBackAndIsReplayedToTheBit) {
   }
 }
 
+// A burr that turns cuts its way in; the replay, which knows no tissue, still comes out the same. A skin loses what was cut, and the cut
+// shows.
+TEST(SoftBody, ATurningBurrCutsVoxelsOff) {
+  const TetMesh rest = pad();
+  const TriMesh skin = boundary_of(rest);
+  double before[2], cut[2];
+  for (const bool with_skin : {false, true}) {
+    const auto file = std::filesystem::temp_directory_path() / "osteo_soft_cut.oss";
+    std::filesystem::remove(file);
+    World world(test::bar(1, 0));
+    const World start = world.copy();
+    RehearsalOptions o;
+    o.session_file = file;
+    o.haptics.device = SpringHand::traits();
+    o.soft = std::make_shared<SoftBody>(pad(), kPad, std::nullopt, with_skin ? &skin : nullptr);
+    const std::size_t triangles = o.soft->drawn().triangles.size();
+    const std::uint64_t version = o.soft->version();
+    Script s = press();
+    s.tool = burr_index(BurrKind::cutting, 6);
+    for (auto& w : s.waypoints) w.drill_on = true;
+    Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(s, 1000), o, {});
+    r.run_to_end({});
+    EXPECT_GT(o.soft->version(), version);
+    const TriMesh& drawn = o.soft->drawn();
+    EXPECT_NE(drawn.triangles.size(), triangles);
+    const MeshCheck closed = check(drawn);
+    if (!with_skin) EXPECT_EQ(closed.open_edges, 0u);
+    for (const auto& t : drawn.triangles)
+      for (const std::uint32_t p : t) ASSERT_LT(p, drawn.points_mm.size());
+    before[with_skin] = volume_mm3(rest);
+    cut[with_skin] = o.soft->cut_off_mm3();
+    EXPECT_GE(cut[with_skin], 3 * 27.0);
+    EXPECT_LT(cut[with_skin], 0.5 * before[with_skin]);
+    // Nothing that is left lies in the burr's track any more than the tissue gives way.
+    EXPECT_NEAR(std::fmod(cut[with_skin], 27.0), 0, 1e-3);
+    const ReplayResult again = replay(read_session(file), start.copy(), {}, {});
+    EXPECT_TRUE(again.identical) << again.difference;
+  }
+  EXPECT_EQ(cut[0], cut[1]);
+}
+
+// A pad hanging over bone, pressed onto it: the bone carries it, until it is drilled away.
+TEST(SoftBody, BoneCarriesIt) {
+  const auto b = test::block(8, 4, 3, 3.0);
+  double top = -1e9;
+  const World world(test::bar(1, 0));
+  // The top of the bar, which lies around the origin.
+  const Vec3 middle{};
+  for (double z = middle.z; z < middle.z + 60; z += 0.1) {
+    if (world.nearest({middle.x, middle.y, z}) > 0.5F) top = z;
+  }
+  TetMesh m;
+  const Vec3 shift{middle.x - 12, middle.y - 6, top + 0.3};
+  for (const Vec3& p : b.points) m.points_mm.push_back(to_floats(p + shift));
+  for (const auto& t : b.tets) m.tets.push_back(t);
+  char problem[300];
+  std::snprintf(
+      problem, sizeof problem,
+      R"({"osteotome_tissue": 1, "material": {"young_kpa": 5, "poisson": 0.4}, "fixed": [{"box_mm": [[%f, -1e4, -1e4], [%f, 1e4, 1e4]]}]})",
+      shift.x - 0.1, shift.x + 0.1);
+  const auto deepest = [&](bool bone) {
+    SoftBody soft(m, problem);
+    if (bone) soft.meet(&world);
+    const std::size_t burr = static_cast<std::size_t>(burr_index(BurrKind::diamond, 6));
+    for (int n = 0; n < 100; ++n)
+      static_cast<void>(soft.update({{shift.x + 20, middle.y, top + 9.3 + 3 - 0.06 * std::min(n, 80)}, {0, 0, 1}, burr, false}));
+    double z = 1e9;
+    for (const Vec3& p : soft.points_mm()) z = std::min(z, p.z);
+    return z - top;
+  };
+  EXPECT_LT(deepest(false), -2);
+  EXPECT_GT(deepest(true), -0.7);
+}
+
 TEST(SoftBody, WithoutItNothingIsDone) {
   const auto file = std::filesystem::temp_directory_path() / "osteo_soft_none.oss";
   std::filesystem::remove(file);

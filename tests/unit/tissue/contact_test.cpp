@@ -80,17 +80,24 @@ TEST(Contact, ABlockRestsOnAPlate) {
   EXPECT_EQ(d.counts().softened, 0u);
 }
 
-// Tissue that begins inside bone is not thrown out of it; only what goes deeper is held.
-TEST(Contact, WhatLiesInsideAtRestStays) {
+// Tissue that begins inside bone is not thrown out of it but grows on it.
+TEST(Contact, WhatLiesInsideAtRestIsTiedToIt) {
   const auto b = test::block(3, 3, 3, 2.0);
   const Material m{0.1, 0.45};
   TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1));
   model.scale({1, 1, 0, 1});
   TissueDynamics<double> d(model, {}, {.damping_per_s = 100});
-  d.set_obstacle({std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, 1.3}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5), 1});
+  d.set_obstacle({std::make_shared<SurfaceShape>(box({-20, -20, -10}, {20, 20, 1.3}), Vec3{-5, -5, -3}, Vec3{11, 11, 8}, 0.5), 0.05});
   d.step(2000);
   const auto x = d.positions_mm();
   for (std::size_t p = 0; p < x.size(); ++p) EXPECT_LT(length(x[p] - b.points[p]), 1e-9);
+  // Pulled, it stays there, with nothing else to hold it.
+  std::vector<std::pair<std::uint32_t, Vec3>> load;
+  for (std::uint32_t p = 0; p < b.points.size(); ++p) load.push_back({p, {0, 0, 1e-3}});
+  d.set_load(load);
+  d.step(40000);
+  EXPECT_LT(d.residual(), 1e-2);
+  for (std::size_t p = 0; p < x.size(); ++p) EXPECT_LT(length(d.positions_mm()[p] - b.points[p]), 1);
 }
 
 // A stiffness that the step has no room for is cut, and counted.

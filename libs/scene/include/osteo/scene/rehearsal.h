@@ -76,8 +76,8 @@ class Rehearsal {
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
   [[nodiscard]] double stiffness_n_per_mm() const { return operation_.renderer().stiffness_n_per_mm(); }
   [[nodiscard]] Device& device() { return *device_; }
-  /// Null where the scene has none; its points under look() only.
-  [[nodiscard]] const SoftBody* soft() const { return options_.soft.get(); }
+  /// Null where the scene has none; under look() only.
+  [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
   void look(const std::function<void(const World&, Follower&)>& f);
 

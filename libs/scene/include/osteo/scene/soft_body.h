@@ -11,24 +11,43 @@
 
 namespace osteo {
 
+/// The tool as soft tissue meets it.
+struct SoftTool {
+  Vec3 at_mm;            ///< centre of the tip
+  Vec3 axis{0, 0, 1};    ///< unit, from burr to handle
+  std::size_t burr = 0;  ///< index in burr_library()
+  bool turns = false;    ///< the drill is on
+};
+
 /// A body of voxels by the fast model (libs/tissue). Its steps in time run a hundred times a second beside the servo; what the hand feels
 /// between them is a plane: the force now, along its own direction, rising with depth. Each such plane is an action of the stream, so a
-/// replay needs no tissue. It does not know bone: what holds it is what its problem says is fixed.
+/// replay needs no tissue. It meets the head of the burr in its own shape, and the bone as it is now: where it lies in bone at rest it has
+/// grown on it, until the bone there is drilled away.
+/// A burr that turns cuts voxels off, by force and time as in bone, kEasierThanBone times as fast.
 class SoftBody {
  public:
-  /// From mesh, problem and perhaps constants, as the stages of tissue take them. Errors: as of those.
-  SoftBody(const TetMesh& mesh, std::string_view problem_json, const std::optional<std::string>& constants_json = std::nullopt);
+  /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn instead of the
+  /// voxels' own. Errors: as of those.
+  SoftBody(const TetMesh& mesh, std::string_view problem_json, const std::optional<std::string>& constants_json = std::nullopt,
+           const TriMesh* skin = nullptr);
   ~SoftBody();
 
   static constexpr double kUpdatesPerS = 100;
-  /// Goes on by one update with the tool (a ball) there; the plane that it pushes with now, or nothing when it pushed neither before nor
+  /// Guesses, no measured rates were found: a twentieth of a newton cuts some tens of mm3 a second, and no burr more than powered shavers
+  /// do.
+  static constexpr double kEasierThanBone = 200, kMostMm3PerS = 100;
+  /// The bone that it meets from now on, as it lies at rest; null: none. The world must stay until another is set.
+  void meet(const World* world);
+  /// Goes on by one update with the tool there; the plane that it pushes with now, or nothing when it pushed neither before nor
   /// now. Simulated time goes slower than the clock's when a hundredth of a second needs more steps than it may take: see slow_motion().
-  std::optional<SceneAction> update(Vec3 tool_mm, double radius_mm);
+  std::optional<SceneAction> update(const SoftTool& tool);
 
   [[nodiscard]] std::vector<Vec3> points_mm() const;
-  [[nodiscard]] const TriMesh& surface() const;                            ///< at rest
-  [[nodiscard]] std::span<const std::uint32_t> points_of_surface() const;  ///< point of the surface -> point of the body
-  [[nodiscard]] double slow_motion() const;                                ///< simulated over real time, at most 1
+  /// The surface as it is now. Its triangles change only with version(), when something was cut off.
+  [[nodiscard]] const TriMesh& drawn();
+  [[nodiscard]] std::uint64_t version() const;
+  [[nodiscard]] double cut_off_mm3() const;
+  [[nodiscard]] double slow_motion() const;  ///< simulated over real time, at most 1
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -36,7 +55,8 @@ class SoftBody {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What a case lists: tissue.vtu and tissue.json in its folder, and tissue-constants.json where it is; null without.
+/// What a case lists: tissue.vtu and tissue.json in its folder, and where they are tissue-constants.json and tissue.ply, the surface that
+/// is drawn; null without.
 [[nodiscard]] std::shared_ptr<SoftBody> soft_body_of(const std::filesystem::path& case_folder);
 
 }  // namespace osteo

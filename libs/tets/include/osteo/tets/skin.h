@@ -35,6 +35,8 @@ class Skin {
   void apply(std::span<const std::array<float, 3>> points_mm, std::span<std::array<float, 3>> out_mm) const;
   [[nodiscard]] std::size_t point_count() const { return count_; }
   [[nodiscard]] std::size_t mesh_point_count() const { return mesh_points_; }
+  /// embedded: the corners of the tetrahedron that a point follows.
+  [[nodiscard]] const std::array<std::uint32_t, 4>& corners(std::size_t point) const { return embeddings_[point].v; }
   /// Points that lie outside the mesh at rest.
   [[nodiscard]] std::size_t outside() const { return outside_; }
 

@@ -21,6 +21,8 @@ class RigidShape {
   /// Signed distance, negative inside, and its gradient (of length about 1, 0 where it has none). Beyond its bounds any number above 0 will
   /// do.
   virtual double distance_mm(Vec3 at, Vec3& outwards) const = 0;
+  /// Balls that together are nearly the shape; none where that is not known. With them a tool meets triangles, not only points.
+  [[nodiscard]] virtual std::vector<Ball> balls() const { return {}; }
 };
 
 class BallShape final : public RigidShape {
@@ -28,6 +30,7 @@ class BallShape final : public RigidShape {
   BallShape(Vec3 centre_mm, double radius_mm) : ball_{centre_mm, radius_mm} {}
   [[nodiscard]] Ball bounds() const override { return ball_; }
   double distance_mm(Vec3 at, Vec3& outwards) const override;
+  [[nodiscard]] std::vector<Ball> balls() const override { return {ball_}; }
 
  private:
   Ball ball_;

@@ -30,7 +30,8 @@ class TissueDynamics {
   ~TissueDynamics();
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
-  /// Pushes all points that it meets, at each step.
+  /// Pushes, at each step, the surface's triangles where they are nearest to it (a shape without balls: points only), and points inside the
+  /// body that it meets. Its stiffness is that of each triangle or point.
   void set_tool(RigidContact tool);
   /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point. Points that lie in
   /// it at rest may stay as deep.
@@ -44,7 +45,7 @@ class TissueDynamics {
   Vec3 step(int steps = 1);
 
   [[nodiscard]] double step_s() const;
-  /// Points that the tool met in the last step.
+  /// Triangles and points that the tool met in the last step.
   [[nodiscard]] int met_by_tool() const;
   [[nodiscard]] std::vector<Vec3> positions_mm() const;
   [[nodiscard]] std::size_t point_count() const;

@@ -29,8 +29,8 @@ class ImplicitDynamics {
   ~ImplicitDynamics();
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
-  void set_tool(RigidContact tool);          ///< meets all points
-  void set_obstacle(RigidContact obstacle);  ///< meets the surface; points that lie in it at rest may stay as deep
+  void set_tool(RigidContact tool);          ///< meets points only, all of them
+  void set_obstacle(RigidContact obstacle);  ///< as of TissueDynamics
   void set_position(std::uint32_t point, Vec3 at_mm);
   void cut_off(std::span<const std::uint32_t> tets);  ///< as of TissueDynamics
 

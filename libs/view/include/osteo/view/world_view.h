@@ -25,7 +25,7 @@ class WorldView {
   /// Shows the scene as it is; after the first time only what changed is made again.
   void update(const World& world, Follower& follower);
   /// Soft tissue as it is now; under the lock that keeps it still.
-  void update_soft(const SoftBody& soft);
+  void update_soft(SoftBody& soft);
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
   [[nodiscard]] std::size_t triangles() const;
@@ -49,6 +49,7 @@ class WorldView {
   const StructureMap* structures_;
   vtkSmartPointer<vtkActor> structures_actor_, soft_actor_;
   vtkSmartPointer<vtkPolyData> soft_data_;
+  std::uint64_t soft_version_ = 0;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
   std::map<std::uint32_t, Plate> plates_;
   std::unique_ptr<DustView> dust_;
@@ -67,6 +68,6 @@ struct WorldPicture {
 };
 /// Works without a display. Error(failed) when there is no OpenGL.
 [[nodiscard]] Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& picture,
-                                 const SoftBody* soft = nullptr);
+                                 SoftBody* soft = nullptr);
 
 }  // namespace osteo
