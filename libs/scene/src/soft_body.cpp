@@ -120,6 +120,11 @@ void SoftBody::Impl::cut(const SoftTool& tool, double force_n) {
   }
   if (tets.empty()) return;
   dynamics.cut_off(tets);
+  // What comes loose with it is taken to be sucked away.
+  tets = dynamics.loose();
+  for (const std::uint32_t t : tets) gone[t] = true;
+  cut_mm3 += voxel_mm3 * static_cast<double>(tets.size()) / 5;
+  dynamics.cut_off(tets);
   lay_surface();
 }
 

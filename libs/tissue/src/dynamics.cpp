@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 #include <string_view>
 #include <type_traits>
 
@@ -60,9 +61,9 @@ tissue::ForceFunction<Real> force_function() {
   }
 }
 
-// Stretched or sheared, edges are stiffer against their length than at rest by their strain: so much is allowed for.
+// Of the certified frequency at rest: so much is allowed for stretch before points are made heavier for it.
 constexpr double kStretchMargin = 1.25;
-constexpr std::uint64_t kObstacleSteps = 10, kTieSteps = 200;
+constexpr std::uint64_t kObstacleSteps = 10, kTieSteps = 200, kCertifySteps = 100;
 
 }  // namespace
 
@@ -78,7 +79,7 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Real> x, y, z, px, py, pz, fx, fy, fz;  // now, before, force
   std::vector<Real> inverse_mass;                     // 1 / (N s2 / mm); 0: fixed
   std::vector<Real> lx, ly, lz;                       // load
-  std::vector<double> mass;
+  std::vector<double> mass, edge_row;
   std::vector<bool> fixed;
   std::vector<Slider> sliders;
   std::vector<std::uint32_t> edge, face, voxel[2], tet;
@@ -96,7 +97,7 @@ struct TissueDynamics<Real>::Impl {
   };
   std::vector<Plane> planes;
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
-  std::uint64_t steps = 0, tool_steps = 0;
+  std::uint64_t steps = 0, tool_steps = 0, since_certified = 0;
   std::unique_ptr<Cutter> cutter;  // once something was cut
   double load_size = 0;
   int met = 0;
@@ -105,6 +106,9 @@ struct TissueDynamics<Real>::Impl {
   Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
   void lay_out();
   double certify();
+  void certify_again();
+  template <class At>
+  void rows(bool edges, const At& place, std::vector<double>& row) const;
   Vec3 forces();
   // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
   [[nodiscard]] double room(std::uint32_t p) const {
@@ -173,28 +177,31 @@ void TissueDynamics<Real>::Impl::lay_out() {
   arrays.tets = {t.size(), tet.data(), tet_k.data(), tet_inverse.data()};
 }
 
-// Limit of the step: 2 / omega, omega^2 <= max over points of (1/m) sum over its constraints of k |grad_i C| sum_j |grad_j C|.
+// Of each point, a bound on its share of the highest frequency: sum over its constraints of k |grad_i C| sum_j |grad_j C|.
 template <class Real>
-double TissueDynamics<Real>::Impl::certify() {
-  std::vector<double> row(x.size());
-  Vec3 local[8];
-  double g[24];
+template <class At>
+void TissueDynamics<Real>::Impl::rows(bool edges, const At& place, std::vector<double>& row) const {
+  Vec3 local[8], g[8];
   for (std::size_t c = 0; c < model.element_count(); ++c) {
     const auto& k = model.constraints()[c];
-    if (k.stiffness == 0 || k.rest == 0) continue;
-    // The gradient of k/2 C^2 at a strain of 1 is k grad C: taken where every length is doubled, its direction at rest.
+    if (k.stiffness == 0 || k.rest == 0 || (k.nodes == 2) != edges) continue;
     const auto nodes = model.nodes(c);
-    for (std::size_t a = 0; a < nodes.size(); ++a) local[a] = model.rest()[nodes[a]] * 2;
-    model.element(c, local, g, nullptr);
-    // q at twice the size: lengths 2, areas 4, volumes 8 times; C = 1, 3, 7; grad q 1, 2, 4 times.
-    const double over = k.nodes == 2 ? 1 : k.nodes == 3 ? 6 : 28;
+    for (std::size_t a = 0; a < nodes.size(); ++a) local[a] = place(nodes[a]);
+    model.measure(c, local, g);
     double norm[8], sum = 0;
-    for (std::size_t a = 0; a < nodes.size(); ++a) {
-      norm[a] = std::sqrt(g[3 * a] * g[3 * a] + g[3 * a + 1] * g[3 * a + 1] + g[3 * a + 2] * g[3 * a + 2]) / over / k.stiffness;
-      sum += norm[a];
-    }
+    for (std::size_t a = 0; a < nodes.size(); ++a) sum += norm[a] = length(g[a]) / k.rest;
     for (std::size_t a = 0; a < nodes.size(); ++a) row[nodes[a]] += k.stiffness * norm[a] * sum;
   }
+}
+
+// Limit of the step: 2 / omega, omega^2 <= max over points of row / m (Gershgorin).
+template <class Real>
+double TissueDynamics<Real>::Impl::certify() {
+  edge_row.assign(x.size(), 0);
+  const auto at_rest = [&](std::uint32_t p) { return model.rest()[p]; };
+  rows(true, at_rest, edge_row);
+  std::vector<double> row = edge_row;
+  rows(false, at_rest, row);
   double most = 0;
   const double heaviest = options.least_step_s > 0 ? 4 / (options.least_step_s * options.least_step_s) : INFINITY;
   for (std::size_t p = 0; p < row.size(); ++p) {
@@ -208,6 +215,21 @@ double TissueDynamics<Real>::Impl::certify() {
     most = std::max(most, omega2);
   }
   return most > 0 ? options.step_share * 2 / std::sqrt(most) : 1e-3;
+}
+
+// Edges are as stiff along themselves however long they are, and across them less; areas and volumes get stiffer as they are stretched, without
+// a bound. What has become too stiff for the step is moved as if it were heavier while it is.
+template <class Real>
+void TissueDynamics<Real>::Impl::certify_again() {
+  std::vector<double> row = edge_row;
+  rows(false, [&](std::uint32_t p) { return at(p); }, row);
+  const double most = 4 * options.step_share * options.step_share / (dt * dt);
+  for (std::size_t p = 0; p < row.size(); ++p) {
+    if (inverse_mass[p] == 0) continue;
+    const double needed = row[p] / most;
+    if (needed > mass[p]) ++counts.stretched;
+    inverse_mass[p] = static_cast<Real>(1 / std::max(mass[p], needed));
+  }
 }
 
 template <class Real>
@@ -310,6 +332,32 @@ void TissueDynamics<Real>::cut_off(std::span<const std::uint32_t> tets) {
   }
   if (!m.triangles.empty()) m.lay_triangles();
   m.tool_steps = 0;
+}
+
+template <class Real>
+std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
+  const Impl& m = *impl_;
+  std::vector<std::uint32_t> parent(m.x.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](std::uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  const auto there = [&](std::uint32_t t) { return !m.cutter || m.cutter->there(t); };
+  for (std::uint32_t t = 0; t < m.model.tets().size(); ++t) {
+    if (!there(t)) continue;
+    for (const std::uint32_t p : m.model.tets()[t]) parent[root(p)] = root(m.model.tets()[t][0]);
+  }
+  std::vector<bool> held(m.x.size());
+  for (std::uint32_t p = 0; p < m.x.size(); ++p) {
+    if (m.fixed[p] || (!m.tied.empty() && m.tied[p])) held[root(p)] = true;
+  }
+  for (const Slider& s : m.sliders) held[root(s.point)] = true;
+  std::vector<std::uint32_t> tets;
+  for (std::uint32_t t = 0; t < m.model.tets().size(); ++t) {
+    if (there(t) && !held[root(m.model.tets()[t][0])]) tets.push_back(t);
+  }
+  return tets;
 }
 
 template <class Real>
@@ -426,8 +474,13 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   met = 0;
   if (tool.shape) on_tool = push_by_tool();
   for (const Plane& q : planes) {
-    const double deep = q.offset - dot(q.normal, at(q.point));
-    if (deep > 0) push(q.point, deep, q.normal);
+    // Not all of a great depth at once, and with half of critical damping: who comes out of bone is not thrown.
+    const double deep = std::min(q.offset - dot(q.normal, at(q.point)), margin);
+    if (!(deep > 0)) continue;
+    const double k = std::min(obstacle.stiffness_n_per_mm, room(q.point));
+    const Vec3 before{static_cast<double>(px[q.point]), static_cast<double>(py[q.point]), static_cast<double>(pz[q.point])};
+    const double slows = dot(q.normal, at(q.point) - before) / dt * std::sqrt(mass[q.point] / k);
+    push(q.point, std::max(0.0, deep - slows), q.normal);
   }
   for (const std::uint32_t p : ties) {
     if (inverse_mass[p] != 0) push(p, 1, model.rest()[p] - at(p));
@@ -445,6 +498,10 @@ Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
   Vec3 on_tool{};
   for (int s = 0; s < steps; ++s) {
+    if (++m.since_certified >= kCertifySteps) {
+      m.since_certified = 0;
+      m.certify_again();
+    }
     if (m.tool.shape && m.tool_steps++ % kObstacleSteps == 0) m.find_near();
     if (m.obstacle.shape) {
       if (m.steps % kObstacleSteps == 0) m.find_planes();

@@ -199,6 +199,7 @@ std::vector<Data> SimulateStage::run(const Params& p, std::span<const Data> inpu
     const auto& counts = dynamics.counts();
     j["places_not_finite"] = counts.not_finite;
     j["points_made_heavier"] = counts.made_heavier;
+    j["points_made_heavier_by_stretch"] = counts.stretched;
     j["pushes_softened"] = counts.softened;
     if (counts.made_heavier > 0)
       context.warn(std::to_string(counts.made_heavier) + " points were made heavier for steps of " + format_number(p.least_step_ms) +

@@ -27,6 +27,8 @@ void add_outer(double* h, std::size_t n, const Vec3* g, double s) {
         for (std::size_t j = 0; j < 3; ++j) h[(3 * a + i) * 3 * n + 3 * b + j] += s * g[a][i] * g[b][j];
 }
 
+constexpr int kWholeTet[4] = {0, 1, 2, 3};
+
 // A tetrahedron's volume; its gradients, and where asked the Hessian times `s` added, for nodes `at` of n.
 double tet_volume(const Vec3* x, const int* at, std::size_t n, Vec3* g, double* hessian, double s) {
   const Vec3 o = x[at[0]], d1 = x[at[1]] - o, d2 = x[at[2]] - o, d3 = x[at[3]] - o;
@@ -62,21 +64,43 @@ double tet_volume(const Vec3* x, const int* at, std::size_t n, Vec3* g, double* 
 
 }  // namespace
 
+double TissueModel::measure(std::size_t e, const Vec3* x, Vec3* g) const {
+  const Constraint& c = constraints_[e];
+  const std::size_t n = c.nodes;
+  if (n == 2) {
+    const Vec3 d = x[1] - x[0];
+    const double q = length(d);
+    g[1] = q > 0 ? d / q : Vec3{};
+    g[0] = g[1] * -1;
+    return q;
+  }
+  if (n == 3) {
+    const Vec3 normal = cross(x[1] - x[0], x[2] - x[0]);
+    const double twice = length(normal);
+    const Vec3 u = twice > 0 ? normal / twice : Vec3{};
+    g[0] = cross(u, x[2] - x[1]) * 0.5;
+    g[1] = cross(u, x[0] - x[2]) * 0.5;
+    g[2] = cross(u, x[1] - x[0]) * 0.5;
+    return 0.5 * twice;
+  }
+  std::fill(g, g + n, Vec3{});
+  if (n == 4) return tet_volume(x, kWholeTet, n, g, nullptr, 0);
+  double q = 0;
+  for (const auto& t : tissue::kVoxelSplit[c.voxel]) q += tet_volume(x, t, n, g, nullptr, 0);
+  return q;
+}
+
 double TissueModel::element(std::size_t e, const Vec3* x, double* gradient, double* hessian) const {
   const Constraint& c = constraints_[e];
   const std::size_t n = c.nodes;
   if (gradient != nullptr) std::fill(gradient, gradient + 3 * n, 0.0);
   if (hessian != nullptr) std::fill(hessian, hessian + 9 * n * n, 0.0);
   if (c.stiffness == 0 || c.rest == 0) return 0;
-  Vec3 g[8] = {};
-  double q = 0;
+  Vec3 g[8];
+  const double q = measure(e, x, g);
   const double k = c.stiffness / c.rest;  // force = -k C grad q
   if (n == 2) {
-    const Vec3 d = x[1] - x[0];
-    q = length(d);
-    const Vec3 u = q > 0 ? d / q : Vec3{};
-    g[0] = u * -1;
-    g[1] = u;
+    const Vec3 u = g[1];
     if (hessian != nullptr && q > 0) {
       const double bend = k * (q / c.rest - 1) / q;
       Row r{};
@@ -88,14 +112,9 @@ double TissueModel::element(std::size_t e, const Vec3* x, double* gradient, doub
       add_block(hessian, n, 1, 0, r, -bend);
     }
   } else if (n == 3) {
-    const Vec3 normal = cross(x[1] - x[0], x[2] - x[0]);
-    const double twice = length(normal);
-    q = 0.5 * twice;
-    const Vec3 u = twice > 0 ? normal / twice : Vec3{};
-    g[0] = cross(u, x[2] - x[1]) * 0.5;
-    g[1] = cross(u, x[0] - x[2]) * 0.5;
-    g[2] = cross(u, x[1] - x[0]) * 0.5;
+    const double twice = 2 * q;
     if (hessian != nullptr && twice > 0) {
+      const Vec3 u = cross(x[1] - x[0], x[2] - x[0]) / twice;
       // A = |c| / 2: d2A = (Jc^T (1 - u u^T) Jc / |c| + u . d2c) / 2, Jc for node a being [opposite edge]x.
       const double s = k * (q / c.rest - 1);
       const Vec3 opposite[3] = {x[2] - x[1], x[0] - x[2], x[1] - x[0]};
@@ -118,11 +137,8 @@ double TissueModel::element(std::size_t e, const Vec3* x, double* gradient, doub
       }
     }
   } else if (n == 4) {
-    constexpr int kAll[4] = {0, 1, 2, 3};
-    q = tet_volume(x, kAll, n, g, nullptr, 0);
-    if (hessian != nullptr) tet_volume(x, kAll, n, nullptr, hessian, k * (q / c.rest - 1));
+    if (hessian != nullptr) tet_volume(x, kWholeTet, n, nullptr, hessian, k * (q / c.rest - 1));
   } else {
-    for (const auto& t : tissue::kVoxelSplit[c.voxel]) q += tet_volume(x, t, n, g, nullptr, 0);
     if (hessian != nullptr) {
       for (const auto& t : tissue::kVoxelSplit[c.voxel]) tet_volume(x, t, n, nullptr, hessian, k * (q / c.rest - 1));
     }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <random>
 #include <thread>
 
 #include "bar.h"
@@ -158,6 +159,18 @@ TEST(SoftBody, BoneCarriesIt) {
   };
   EXPECT_LT(deepest(false), -2);
   EXPECT_GT(deepest(true), -0.7);
+  // A tool that jumps about, turning, presses it into the bone from all sides: nothing is thrown.
+  SoftBody soft(m, problem);
+  soft.meet(&world);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto burr = static_cast<std::size_t>(burr_index(BurrKind::cutting, 4));
+  for (int n = 0; n < 400; ++n) {
+    const Vec3 at = shift + Vec3{24 * u(random), 12 * u(random), 4 + 8 * u(random)};
+    for (int k = 0; k < 3; ++k) static_cast<void>(soft.update({at, normalized({u(random), u(random), 1}), burr, n > 200}));
+  }
+  EXPECT_GT(soft.cut_off_mm3(), 0);
+  for (const Vec3& p : soft.points_mm()) ASSERT_LT(length(p - shift), 60);
 }
 
 TEST(SoftBody, WithoutItNothingIsDone) {

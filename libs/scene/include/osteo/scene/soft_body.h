@@ -23,7 +23,7 @@ struct SoftTool {
 /// between them is a plane: the force now, along its own direction, rising with depth. Each such plane is an action of the stream, so a
 /// replay needs no tissue. It meets the head of the burr in its own shape, and the bone as it is now: where it lies in bone at rest it has
 /// grown on it, until the bone there is drilled away.
-/// A burr that turns cuts voxels off, by force and time as in bone, kEasierThanBone times as fast.
+/// A burr that turns cuts voxels off, by force and time as in bone, kEasierThanBone times as fast; what comes loose is gone with them.
 class SoftBody {
  public:
   /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn instead of the

@@ -19,7 +19,7 @@ struct DynamicsOptions {
 };
 
 /// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the
-/// highest frequency at rest, with a quarter more for stretch. Lumped masses. A place that is no number is not taken, and counted. `Real`
+/// highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for every hundred steps. Lumped masses. A place that is no number is not taken, and counted. `Real`
 /// float: the quick one; double: the exact one, momentum kept to rounding. The same bits for any instruction set.
 template <class Real>
 class TissueDynamics {
@@ -40,6 +40,8 @@ class TissueDynamics {
   /// Cuts off tetrahedra (their numbers in the model), without a restart: what they held goes, what they shared gets weaker. A point of
   /// which nothing is left stays where it is and meets nothing. O(constraints).
   void cut_off(std::span<const std::uint32_t> tets);
+  /// Tetrahedra of parts that nothing holds: no fixed or sliding point, nothing tied to the obstacle. O(tets).
+  [[nodiscard]] std::vector<std::uint32_t> loose() const;
 
   /// Returns the force on the tool in the last step, N.
   Vec3 step(int steps = 1);
@@ -58,6 +60,7 @@ class TissueDynamics {
   struct Counts {
     std::uint64_t not_finite = 0;    ///< points put back where they were because their place was no number
     std::uint64_t made_heavier = 0;  ///< points, for least_step_s
+    std::uint64_t stretched = 0;     ///< points, at each check, that were moved as if heavier since what they belong to was stretched far
     std::uint64_t softened = 0;      ///< pushes of tool or obstacle that the step allowed less stiffness than asked for
   };
   [[nodiscard]] const Counts& counts() const;

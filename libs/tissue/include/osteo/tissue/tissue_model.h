@@ -46,6 +46,8 @@ class TissueModel final : public Energy {
     return {constraints_[e].node.data(), constraints_[e].nodes};
   }
   double element(std::size_t e, const Vec3* x, double* gradient, double* hessian) const override;
+  /// A constraint's q at the places `x` of its nodes, and its gradient by each of them.
+  double measure(std::size_t e, const Vec3* x, Vec3* gradient) const;
 
   [[nodiscard]] const std::vector<Vec3>& rest() const { return rest_; }
   [[nodiscard]] const std::vector<Constraint>& constraints() const { return constraints_; }
