@@ -9,16 +9,13 @@
 #include <random>
 
 #include "bench.h"
-#include "block.h"
-#include "osteo/tissue/calibrate.h"
-#include "osteo/tissue/dynamics.h"
+#include "bench_tissue.h"
 
 namespace osteo {
-namespace {
 
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+using namespace bench;
+
+namespace {
 
 // A gear 2 m wide and 3/8 m thick, with a hole; voxels of 2 m / n.
 test::Block gear(int n) {
@@ -27,46 +24,6 @@ test::Block gear(int n) {
     const double x = p.x - 1000, y = p.y - 1000, r = std::hypot(x, y), a = std::atan2(y, x);
     return r > 250 && r < (std::cos(10 * a) > 0 ? 1000 : 780);
   });
-}
-
-struct Body {
-  test::Block b;
-  std::vector<std::uint32_t> fixed;
-};
-
-// A load on the points near a place, shared evenly.
-void patch(const Body& body, Vec3 at, double radius, Vec3 total, TissueLoad& load) {
-  std::vector<std::uint32_t> near;
-  std::vector<bool> held(body.b.points.size());
-  for (const std::uint32_t p : body.fixed) held[p] = true;
-  for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
-    if (!held[p] && length(body.b.points[p] - at) < radius) near.push_back(p);
-  }
-  for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
-}
-
-struct Truth {
-  std::vector<Vec3> x;
-  double seconds = 0;
-  bool converged = false;
-};
-
-Truth solve_fem(const Body& body, const std::vector<Material>& materials, ElasticLaw law, TetOrder order, const TissueLoad& load) {
-  const double begin = now_s();
-  const FemBody fem(body.b.points, body.b.tets, materials, law, order);
-  EquilibriumSolver solver(fem, fem.rest(), fem.with_middles(body.fixed));
-  const Equilibrium r = solver.solve(fem, fem.rest(), load.forces_n, {1e-10, 60, 1});
-  Truth t;
-  t.x.assign(r.points_mm.begin(), r.points_mm.begin() + static_cast<std::ptrdiff_t>(body.b.points.size()));
-  t.seconds = now_s() - begin;
-  t.converged = r.converged;
-  return t;
-}
-
-double nrms_of(TissueModel& model, const Body& body, const TissueLoad& load, std::span<const Vec3> truth) {
-  EquilibriumSolver solver(model, model.rest(), body.fixed);
-  const Equilibrium r = solver.solve(model, model.rest(), load.forces_n);
-  return r.converged ? calibration_error(model.rest(), r.points_mm, truth).nrms : NAN;
 }
 
 // --- black boxes ---------------------------------------------------------------------------------------------------
@@ -278,46 +235,6 @@ void gear_calibration(const Context& context) {
   }
 }
 
-// A beam 10 x 1 x 1 bent at its end: energy (half the load's work) against the finest quadratic answer.
-void convergence() {
-  std::printf(
-      "### Finite elements: error of the energy of a bent beam against t10 at 1/4, and its order\n\n| h | t4 | order | t10 | order | "
-      "seconds t4, t10 |\n|---|---|---|---|---|---|\n");
-  double energy[3][2], seconds[3][2];
-  const auto solve = [](int n, TetOrder order) {
-    Body body{test::block(10 * n, n, n, 1.0 / n), {}};
-    TissueLoad load;
-    for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
-      if (body.b.points[p].x < 1e-9) body.fixed.push_back(p);
-    }
-    // Shear over the end face, shared as a uniform traction is among bilinear squares.
-    for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
-      const Vec3 q = body.b.points[p];
-      if (q.x < 10 - 1e-9) continue;
-      const double share = (q.y < 1e-9 || q.y > 1 - 1e-9 ? 0.5 : 1) * (q.z < 1e-9 || q.z > 1 - 1e-9 ? 0.5 : 1) / (n * n);
-      load.forces_n.push_back({p, {0, 0, 0.01 * share}});
-    }
-    const double begin = now_s();
-    const FemBody fem(body.b.points, body.b.tets, {{100, 0.3}}, ElasticLaw::linear, order);
-    EquilibriumSolver solver(fem, fem.rest(), fem.with_middles(body.fixed));
-    const Equilibrium r = solver.solve(fem, fem.rest(), load.forces_n);
-    return std::pair{r.energy_mj, now_s() - begin};
-  };
-  constexpr int kFine[3] = {1, 2, 4};
-  for (int k = 0; k < 3; ++k)
-    for (int o = 0; o < 2; ++o) std::tie(energy[k][o], seconds[k][o]) = solve(kFine[k], o == 0 ? TetOrder::t4 : TetOrder::t10);
-  // What t10 tends to, from its last two (Aitken over the three).
-  const double a = energy[0][1], b = energy[1][1], c = energy[2][1], exact = c - (c - b) * (c - b) / (c - 2 * b + a);
-  for (int k = 0; k < 3; ++k) {
-    const double e4 = std::abs(energy[k][0] / exact - 1), e10 = std::abs(energy[k][1] / exact - 1);
-    const double o4 = k > 0 ? std::log2(std::abs(energy[k - 1][0] / exact - 1) / e4) : 0,
-                 o10 = k > 0 ? std::log2(std::abs(energy[k - 1][1] / exact - 1) / e10) : 0;
-    std::printf("| 1/%d | %.3f | %s | %.4f | %s | %.2f, %.2f |\n", kFine[k], e4, k > 0 ? std::to_string(o4).substr(0, 4).c_str() : "", e10,
-                k > 0 ? std::to_string(o10).substr(0, 4).c_str() : "", seconds[k][0], seconds[k][1]);
-  }
-  std::printf("\n");
-}
-
 void incompressible() {
   std::printf(
       "### Poisson's ratio near a half: cube of 8 x 8 x 8 voxels, base held, load on top\n\n| nu | T4 off T10 | closed form off T10 | "
@@ -341,7 +258,7 @@ void incompressible() {
 }
 
 void two_materials(const Context& context) {
-  std::printf("### Cube of 1000 kPa below and 50 kPa above, nu 0.499: stiffness learnt on a 5 x 5 x 5 grid from one uniform guess\n\n");
+  std::printf("### Cube of 1000 kPa below and 50 kPa above, nu 0.499: stiffness learnt from one uniform guess\n\n");
   Body body{test::block(8, 8, 8, 25), {}};
   for (std::uint32_t p = 0; p < body.b.points.size(); ++p) {
     if (body.b.points[p].z < 1e-9) body.fixed.push_back(p);
@@ -358,135 +275,55 @@ void two_materials(const Context& context) {
   patch(body, {200, 100, 60}, 60, {20, 0, 0}, load);
   const Truth truth = solve_fem(body, materials, ElasticLaw::neo_hooke, TetOrder::t10, load);
   const Material guess{0.2, 0.499};
-  TissueModel model = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&guess, 1));
-  const CalibrationCase c{load, truth.x};
-  CalibrateOptions one, grid;
-  grid.grid = {5, 5, 5};
-  grid.pull = 0.01;
-  TissueModel homogeneous = model;
-  TissueModel mapped = model;
-  const Calibration h = calibrate(homogeneous, std::span(&c, 1), one, context), m = calibrate(mapped, std::span(&c, 1), grid, context);
-  // The same map from three loads.
-  std::vector<CalibrationCase> three{c};
+  const TissueModel uniform = TissueModel::of_voxels(body.b.points, body.b.tets, std::span(&guess, 1));
+  std::vector<CalibrationCase> cases{{load, truth.x}};
   for (const auto& [at, f] : {std::pair{Vec3{30, 170, 200}, Vec3{-4, -3, -2}}, {Vec3{100, 200, 70}, Vec3{0, -25, 10}}}) {
     TissueLoad l;
     l.fixed = body.fixed;
     patch(body, at, 60, f, l);
-    three.push_back({l, solve_fem(body, materials, ElasticLaw::neo_hooke, TetOrder::t10, l).x});
+    cases.push_back({l, solve_fem(body, materials, ElasticLaw::neo_hooke, TetOrder::t10, l).x});
   }
-  TissueModel thrice = model;
-  const Calibration t = calibrate(thrice, three, grid, context);
-  grid.shared_grid = false;
-  const Calibration g = calibrate(model, std::span(&c, 1), grid, context);
-  // Mean logarithm of edges in the middle of the lower half and of the upper.
-  const auto contrast = [](const Calibration& r) {
-    double low = 0, high = 0;
-    for (std::size_t i = 0; i < 25; ++i) {
-      low += (r.log_factors[(25 * 1 + i) * 4] + r.log_factors[(25 * 1 + i) * 4 + 1]) / 50;
-      high += (r.log_factors[(25 * 3 + i) * 4] + r.log_factors[(25 * 3 + i) * 4 + 1]) / 50;
-    }
-    return std::exp(low - high);
-  };
   TissueLoad other;
   other.fixed = body.fixed;
   patch(body, {40, 40, 200}, 60, {-3, 4, -3}, other);
   const Truth unseen = solve_fem(body, materials, ElasticLaw::neo_hooke, TetOrder::t10, other);
-  std::printf("| | parameters | solves | s | NRMS | NRMS on another load | contrast learnt (true 20) |\n|---|---|---|---|---|---|---|\n");
-  std::printf("| homogeneous | %d | %d | %.1f | %.3f | %.3f | |\n", h.parameters, h.solves, h.seconds, h.after[0].nrms,
-              nrms_of(homogeneous, body, other, unseen.x));
-  std::printf("| map of stiffness | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", m.parameters, m.solves, m.seconds, m.after[0].nrms,
-              nrms_of(mapped, body, other, unseen.x), contrast(m));
-  std::printf("| map of stiffness, three loads | %d | %d | %.1f | %.3f | %.3f | %.1f |\n", t.parameters, t.solves, t.seconds,
-              t.after[0].nrms, nrms_of(thrice, body, other, unseen.x), contrast(t));
-  std::printf("| a map for each class | %d | %d | %.1f | %.3f | %.3f | %.1f |\n\n", g.parameters, g.solves, g.seconds, g.after[0].nrms,
-              nrms_of(model, body, other, unseen.x), contrast(g));
-}
-
-// One Gauss-Seidel pass over edges and tetrahedra (M. Macklin et al., XPBD, 2016), in single precision, as its open implementations do it.
-class Xpbd {
- public:
-  Xpbd(const test::Block& b, const TissueModel& model, double dt) {
-    for (const Vec3& p : b.points) x_.push_back(to_floats(p));
-    std::vector<double> mass(b.points.size());
-    for (const auto& t : b.tets) {
-      const double v = dot(b.points[t[1]] - b.points[t[0]], cross(b.points[t[2]] - b.points[t[0]], b.points[t[3]] - b.points[t[0]])) / 6;
-      for (const std::uint32_t p : t) mass[p] += v * 1e-9 / 4;
-      tets_.push_back({t, static_cast<float>(v), static_cast<float>(1 / (0.05 * v * dt * dt) * 1e-6)});
+  // Geometric means of what edges a voxel or more from the border were learnt to be, kPa.
+  const auto learnt = [&](const TissueModel& model) {
+    double sum[2] = {0, 0};
+    int count[2] = {0, 0};
+    for (std::size_t k = 0; k < model.constraints().size(); ++k) {
+      const auto& q = model.constraints()[k];
+      if (q.nodes != 2) continue;
+      const double a = model.rest()[q.node[0]].z, b = model.rest()[q.node[1]].z;
+      const int half = std::max(a, b) < 99 ? 0 : std::min(a, b) > 101 ? 1 : 2;
+      if (half == 2) continue;
+      sum[half] += std::log(1000 * guess.young_mpa * q.stiffness / model.base_stiffness(k));
+      ++count[half];
     }
-    for (const double m : mass) w_.push_back(static_cast<float>(1 / m));
-    for (const auto& c : model.constraints()) {
-      if (c.nodes == 2)
-        edges_.push_back(
-            {{c.node[0], c.node[1]}, static_cast<float>(c.rest), static_cast<float>(c.rest * c.rest / (c.stiffness * dt * dt))});
-    }
-  }
-  void iterate() {
-    for (Edge& e : edges_) {
-      auto &p = x_[e.node[0]], &q = x_[e.node[1]];
-      const float d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, l = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-      const float s = -(l - e.rest) / (w_[e.node[0]] + w_[e.node[1]] + e.compliance) / l;
-      for (std::size_t a = 0; a < 3; ++a) {
-        p[a] -= w_[e.node[0]] * s * d[a];
-        q[a] += w_[e.node[1]] * s * d[a];
-      }
-    }
-    for (Tet& t : tets_) {
-      const auto v = [&](int i) { return from_floats(x_[t.node[static_cast<std::size_t>(i)]]); };
-      const Vec3 d1 = v(1) - v(0), d2 = v(2) - v(0), d3 = v(3) - v(0);
-      const Vec3 g[4] = {(cross(d2, d3) + cross(d3, d1) + cross(d1, d2)) / -6, cross(d2, d3) / 6, cross(d3, d1) / 6, cross(d1, d2) / 6};
-      double sum = static_cast<double>(t.compliance);
-      for (std::size_t i = 0; i < 4; ++i) sum += static_cast<double>(w_[t.node[i]]) * dot(g[i], g[i]);
-      const double s = -(dot(d1, cross(d2, d3)) / 6 - static_cast<double>(t.rest)) / sum;
-      for (std::size_t i = 0; i < 4; ++i)
-        for (std::size_t a = 0; a < 3; ++a) x_[t.node[i]][a] += static_cast<float>(s * static_cast<double>(w_[t.node[i]]) * g[i][a]);
-    }
-  }
-  [[nodiscard]] float first() const { return x_[0][0]; }
-
- private:
-  struct Edge {
-    std::array<std::uint32_t, 2> node;
-    float rest, compliance;
+    return std::array{std::exp(sum[0] / count[0]), std::exp(sum[1] / count[1])};
   };
-  struct Tet {
-    std::array<std::uint32_t, 4> node;
-    float rest, compliance;
-  };
-  std::vector<std::array<float, 3>> x_;
-  std::vector<float> w_;
-  std::vector<Edge> edges_;
-  std::vector<Tet> tets_;
-};
-
-void throughput() {
   std::printf(
-      "### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: tets/ms | steps/s | "
-      "double | thesis' constraints (edges, faces, "
-      "tetrahedra) | one pass of XPBD |\n|---|---|---|---|---|---|---|\n",
-      tissue_simd_name());
-  for (const int n : {14, 22, 40}) {
-    const auto b = test::block(n, n, n, 5);
-    const Material m{0.1, 0.45};
-    TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1), false);
-    const TissueModel old = TissueModel::uniform(b.points, b.tets, 0.5, 0.2, 0.9);
-    TissueDynamics<float> quick(model, {});
-    TissueDynamics<double> exact(model, {});
-    TissueDynamics<float> thesis(old, {});
-    Xpbd xpbd(b, model, quick.step_s());
-    const auto rate = [&](const std::function<void()>& f) {
-      f();
-      double best = 1e9;
-      for (int r = 0; r < 5; ++r) {
-        const double begin = now_s();
-        for (int s = 0; s < 20; ++s) f();
-        best = std::min(best, (now_s() - begin) / 20);
-      }
-      return static_cast<double>(b.tets.size()) / best / 1000;
-    };
-    const double own = rate([&] { quick.step(); });
-    std::printf("| %zu | %.3f | %.0f | %.0f | %.0f | %.0f | %.0f |\n", b.tets.size(), 1000 * quick.step_s(), own,
-                own * 1000 / static_cast<double>(b.tets.size()), rate([&] { exact.step(); }), rate([&] { thesis.step(); }),
-                rate([&] { xpbd.iterate(); }));
+      "| | fitted to | parameters | solves | s | NRMS | NRMS on another load | learnt kPa | contrast (true 20) "
+      "|\n|---|---|---|---|---|---|---|---|---|\n");
+  struct Row {
+    const char* name;
+    std::array<int, 3> grid;
+    bool shared;
+    std::size_t loads;
+  };
+  for (const Row& row : {Row{"homogeneous", {1, 1, 1}, true, 1}, Row{"map of 5 x 5 x 5", {5, 5, 5}, true, 1},
+                         Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 1}, Row{"map of 9 x 9 x 9", {9, 9, 9}, true, 1},
+                         Row{"map of 5 x 5 x 9", {5, 5, 9}, true, 3}, Row{"a map of 5 x 5 x 5 for each class", {5, 5, 5}, false, 1}}) {
+    TissueModel model = uniform;
+    CalibrateOptions o;
+    o.grid = row.grid;
+    o.shared_grid = row.shared;
+    if (row.grid[0] > 1) o.pull = 0.01;
+    const Calibration c = calibrate(model, std::span(cases.data(), row.loads), o, context);
+    const auto [low, high] = learnt(model);
+    std::printf("| %s | %zu | %d | %d | %.1f | %.4f | %.3f | %.0f, %.0f | %.1f |\n", row.name, row.loads, c.parameters, c.solves, c.seconds,
+                c.after[0].nrms, nrms_of(model, body, other, unseen.x), low, high, low / high);
+    std::fflush(stdout);
   }
   std::printf("\n");
 }
@@ -494,8 +331,8 @@ void throughput() {
 }  // namespace
 
 void bench_tissue(const Context& context) {
-  convergence();
-  throughput();
+  bench::tissue_elements();
+  bench::tissue_time();
   two_materials(context);
   incompressible();
   gear_calibration(context);

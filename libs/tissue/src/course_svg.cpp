@@ -9,7 +9,7 @@
 namespace osteo::tissue {
 namespace {
 
-constexpr double kWidth = 940, kHeight = 380, kTop = 48, kBottom = 44, kLeft = 64, kGap = 76, kRight = 150;
+constexpr double kWidth = 940, kHeight = 380, kTop = 48, kBottom = 44, kLeft = 64, kGap = 76, kRight = 220;
 constexpr double kPanel = (kWidth - kLeft - kGap - kRight) / 2;
 constexpr const char* kColours[kTissueClasses] = {"#1f6fb2", "#2a9d5c", "#b0761a", "#b3261e"};
 constexpr const char* kNames[kTissueClasses] = {"axis edges", "diagonal edges", "faces", "volumes"};
@@ -111,9 +111,14 @@ std::string course_svg(const Calibration& c, const std::string& title) {
     label += 20;
   }
   for (std::size_t k = 0; k < classes && !own_maps; ++k) {
-    char line[64];
+    char line[96];
     const std::size_t number = c.uncertainty.size() - classes + k;
-    std::snprintf(line, sizeof line, "%s %.2g (x/%.2g)", kNames[k], std::exp(c.course.back()[map + k]), std::exp(c.uncertainty[number]));
+    const double log = c.uncertainty[number];
+    if (log > 2) {
+      std::snprintf(line, sizeof line, "%s %.2g, not determined", kNames[k], std::exp(c.course.back()[map + k]));
+    } else {
+      std::snprintf(line, sizeof line, "%s %.2g, within %.0f %%", kNames[k], std::exp(c.course.back()[map + k]), 100 * (std::exp(log) - 1));
+    }
     d.text(kWidth - kRight + 14, label, line, "start", kColours[k], 12);
     label += 20;
   }

@@ -217,12 +217,13 @@ double TissueDynamics<Real>::Impl::certify() {
   return most > 0 ? options.step_share * 2 / std::sqrt(most) : 1e-3;
 }
 
-// Edges are as stiff along themselves however long they are, and across them less; areas and volumes get stiffer as they are stretched, without
-// a bound. What has become too stiff for the step is moved as if it were heavier while it is.
+// Edges are as stiff along themselves however long they are, and across them less; areas and volumes get stiffer as they are stretched,
+// without a bound. What has become too stiff for the step is moved as if it were heavier while it is.
 template <class Real>
 void TissueDynamics<Real>::Impl::certify_again() {
   std::vector<double> row = edge_row;
-  rows(false, [&](std::uint32_t p) { return at(p); }, row);
+  rows(
+      false, [&](std::uint32_t p) { return at(p); }, row);
   const double most = 4 * options.step_share * options.step_share / (dt * dt);
   for (std::size_t p = 0; p < row.size(); ++p) {
     if (inverse_mass[p] == 0) continue;

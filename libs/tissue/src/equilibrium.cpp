@@ -119,6 +119,8 @@ struct EquilibriumSolver::Impl {
   std::vector<std::int64_t> slots;   // where block (a, b), a >= b by number, of an element goes: its first value in each of three columns
   Matrix h;
   Factor factor;
+  double shift = 0;
+  bool stale = false;  // h is newer than its factor
 
   // What of a vector at a point lies along axes that may move.
   [[nodiscard]] Vec3 of_free(std::uint32_t p, Vec3 v) const {
@@ -126,6 +128,7 @@ struct EquilibriumSolver::Impl {
     return v;
   }
   void pattern(const Energy& energy);
+  bool factorise(Equilibrium& counts);
   void assemble(const Energy& energy, std::span<const Vec3> x, std::vector<Vec3>& gradient);
 };
 
@@ -177,6 +180,21 @@ void EquilibriumSolver::Impl::pattern(const Energy& energy) {
         slots.push_back(h.outerIndexPtr()[3 * j] + 3 * place);
       }
     }
+  }
+}
+
+// Cholesky, with a shift where the energy is not convex; what sufficed last time is tried first, a tenth of it.
+bool EquilibriumSolver::Impl::factorise(Equilibrium& counts) {
+  stale = false;
+  double mean = 0;
+  for (Eigen::Index d = 0; d < h.rows(); ++d) mean += std::abs(h.coeff(d, d)) / static_cast<double>(h.rows());
+  shift = shift > 1e-9 * mean ? 0.1 * shift : 0;
+  for (int tries = 0;; ++tries) {
+    ++counts.factorisations;
+    if (factor.factorise(h, shift)) return true;
+    ++counts.shifted;
+    shift = shift > 0 ? 4 * shift : 1e-4 * mean;
+    if (tries == 40 || !std::isfinite(mean)) return false;
   }
 }
 
@@ -300,7 +318,7 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
   };
   const auto n = static_cast<Eigen::Index>(3 * m.moving);
   Eigen::VectorXd right(n), step(n);
-  double shift = 0;
+  m.shift = 0;
   for (int s = 1; s <= std::max(1, options.load_steps); ++s) {
     share = static_cast<double>(s) / std::max(1, options.load_steps);
     double value = potential(x);
@@ -328,23 +346,14 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
       const bool stalled = result.residual < 1e-7 && result.residual > 0.5 * last_residual;
       last_residual = result.residual;
       const bool small = result.residual <= options.tolerance || stalled;
-      // Cholesky, with a shift where the energy is not convex; what sufficed last time is tried first, a tenth of it.
-      double mean = 0;
-      for (Eigen::Index d = 0; d < n; ++d) mean += std::abs(m.h.coeff(d, d)) / static_cast<double>(n);
-      shift = shift > 1e-9 * mean ? 0.1 * shift : 0;
-      for (int tries = 0;; ++tries) {
-        ++result.factorisations;
-        if (m.factor.factorise(m.h, shift)) break;
-        ++result.shifted;
-        shift = shift > 0 ? 4 * shift : 1e-4 * mean;
-        if (tries == 40 || !std::isfinite(mean)) {
-          result.why = "the Hessian cannot be factorised: a number in it is not finite";
-          return result;
-        }
-      }
       if (small) {
+        m.stale = true;  // factorised where back_solve() needs it
         done = true;
         break;
+      }
+      if (!m.factorise(result)) {
+        result.why = "the Hessian cannot be factorised: a number in it is not finite";
+        return result;
       }
       step = m.factor.solve(right);
       // What is left to move is lost in the rounding of the places themselves: at rest, whatever the forces' rounding adds up to.
@@ -407,8 +416,9 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
   return result;
 }
 
-void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> x) const {
-  const Impl& m = *impl_;
+void EquilibriumSolver::back_solve(std::span<const Vec3> right, std::span<Vec3> x) {
+  Impl& m = *impl_;
+  if (Equilibrium ignored; m.stale && !m.factorise(ignored)) throw Error(ExitCode::failed, "the Hessian at rest is not finite");
   Eigen::VectorXd b(static_cast<Eigen::Index>(3 * m.moving));
   for (std::uint32_t p = 0; p < right.size(); ++p) {
     if (m.number[p] == kFixed) continue;

@@ -14,6 +14,7 @@
 
 #include "block.h"
 #include "derivatives.h"
+#include "mapped.h"
 #include "osteo/base/error.h"
 
 namespace osteo {
@@ -235,54 +236,16 @@ TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
   }
 }
 
-// Hexahedra in rows, mapped from the unit cube; sliders and faces by the place they come from.
-struct Mapped {
-  test::Block b;
-  std::vector<Vec3> from;  // in the unit cube
-};
-Mapped mapped(int nx, int ny, int nz, const std::function<Vec3(Vec3)>& map) {
-  Mapped m{block(nx, ny, nz, 1.0), {}};
-  for (Vec3& p : m.b.points) {
-    m.from.push_back({p.x / nx, p.y / ny, p.z / nz});
-    p = map(m.from.back());
-  }
-  return m;
-}
-TissueLoad held(const Mapped& m, const std::function<int(Vec3)>& axes) {
-  TissueLoad load;
-  for (std::uint32_t p = 0; p < m.from.size(); ++p) {
-    const int h = axes(m.from[p]);
-    if (h == 7) load.fixed.push_back(p);
-    if (h != 0 && h != 7) load.sliders.push_back({p, static_cast<std::uint8_t>(h)});
-  }
-  return load;
-}
-// Force over area, as a function of place, on the boundary where `in` is true of all three corners.
-void load_faces(const Mapped& m, const std::function<bool(Vec3)>& in, const std::function<Vec3(Vec3 area_outwards)>& force,
-                TissueLoad& load) {
-  TetMesh mesh;
-  for (const Vec3& p : m.b.points) mesh.points_mm.push_back(to_floats(p));
-  for (const auto& t : m.b.tets) mesh.tets.push_back(t);
-  std::vector<std::uint32_t> point_of;
-  const TriMesh skin = boundary_of(mesh, &point_of);
-  for (const auto& t : skin.triangles) {
-    const std::array<std::uint32_t, 3> face{point_of[t[0]], point_of[t[1]], point_of[t[2]]};
-    if (!in(m.from[face[0]]) || !in(m.from[face[1]]) || !in(m.from[face[2]])) continue;
-    const auto at = [&](std::size_t i) { return m.b.points[face[i]]; };
-    load.add_on_face(face, force(cross(at(1) - at(0), at(2) - at(0)) * 0.5));
-  }
-}
-
 // Cook's membrane, plane stress (R. Cook 1974): 48 wide, its left edge 44 high and held, its right edge 16 high and sheared by 1; E 1, nu
 // 1/3. The middle of the right edge rises by 23.96 (fine meshes of many authors). A thin slab in its plane of symmetry here.
 TEST(Fem, CooksMembrane) {
   double rise[2][2];
   for (const int fine : {0, 1}) {
     const int n = fine == 0 ? 6 : 12;
-    const auto m = mapped(n, n, 1, [](Vec3 u) { return Vec3{48 * u.x, 44 * u.x + (44 - 28 * u.x) * u.y, 0.5 * u.z}; });
+    const auto m = test::mapped(n, n, 1, [](Vec3 u) { return Vec3{48 * u.x, 44 * u.x + (44 - 28 * u.x) * u.y, 0.5 * u.z}; });
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(m.b.points, m.b.tets, {{1, 1.0 / 3}}, ElasticLaw::linear, order);
-      TissueLoad load = held(m, [](Vec3 u) { return (u.x == 0 ? 3 : 0) | (u.z == 0 ? 4 : 0); });
+      TissueLoad load = test::held(m, [](Vec3 u) { return (u.x == 0 ? 3 : 0) | (u.z == 0 ? 4 : 0); });
       load_faces(
           m, [](Vec3 u) { return u.x == 1; },
           [](Vec3 area) {
@@ -313,13 +276,13 @@ TEST(Fem, LamesTube) {
     double error[2][2];
     for (const int fine : {0, 1}) {
       const int n = fine == 0 ? 4 : 8;
-      const auto m = mapped(n, 2 * n, 1, [&](Vec3 u) {
+      const auto m = test::mapped(n, 2 * n, 1, [&](Vec3 u) {
         const double r = 1 + u.x, a = u.y * std::acos(-1.0) / 2;
         return Vec3{u.y == 1 ? 0 : r * std::cos(a), r * std::sin(a), 1.0 / n * u.z};
       });
       for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
         const FemBody body(m.b.points, m.b.tets, {{1, nu}}, ElasticLaw::linear, order);
-        TissueLoad load = held(m, [](Vec3 u) { return 4 | (u.y == 0 ? 2 : 0) | (u.y == 1 ? 1 : 0); });
+        TissueLoad load = test::held(m, [](Vec3 u) { return 4 | (u.y == 0 ? 2 : 0) | (u.y == 1 ? 1 : 0); });
         load_faces(
             m, [](Vec3 u) { return u.x == 0; }, [](Vec3 area) { return area * -0.01; }, load);
         const TissueLoad all = body.on_all_points(load);

@@ -19,8 +19,9 @@ struct DynamicsOptions {
 };
 
 /// Verlet's method with implicit viscous damping (D. Morris 2006, section 5.4.1). The step is certified by Gershgorin's bound on the
-/// highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for every hundred steps. Lumped masses. A place that is no number is not taken, and counted. `Real`
-/// float: the quick one; double: the exact one, momentum kept to rounding. The same bits for any instruction set.
+/// highest frequency at rest, with a quarter more for stretch; what is stretched further is looked for every hundred steps. Lumped masses.
+/// A place that is no number is not taken, and counted. `Real` float: the quick one; double: the exact one, momentum kept to rounding. The
+/// same bits for any instruction set.
 template <class Real>
 class TissueDynamics {
  public:

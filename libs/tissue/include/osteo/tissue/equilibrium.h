@@ -67,7 +67,7 @@ class EquilibriumSolver {
                     const EquilibriumOptions& options = {}, const Context& context = {});
 
   /// Right after solve(): answers `right` (one vector a point) of H x = right at the equilibrium, zero at fixed points. For sensitivities.
-  void back_solve(std::span<const Vec3> right, std::span<Vec3> x) const;
+  void back_solve(std::span<const Vec3> right, std::span<Vec3> x);
 
  private:
   struct Impl;
