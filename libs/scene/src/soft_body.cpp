@@ -21,7 +21,7 @@ constexpr int kMostSteps = 200;          // an update, so that it stays within i
 constexpr double kToolStiffness = 0.1;   // N/mm of each place that the tool meets
 constexpr double kBoneStiffness = 0.3;   // and of each point that meets bone
 constexpr double kFeltStiffness = 0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
-constexpr double kDampingPerS = 60;
+constexpr double kDampingPerS = 150;  // tissue does not ring
 constexpr double kStepShare = 0.75;  // of the certified step, so that there is room for stiff contact
 
 std::array<std::uint32_t, 4> sorted(std::array<std::uint32_t, 4> t) {

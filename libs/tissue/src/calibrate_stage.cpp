@@ -77,7 +77,7 @@ ordered_json learnt(const TissueProblem& problem, const TissueModel& model, std:
 StageInfo CalibrateStage::info() {
   return {
       .name = "calibrate",
-      .version = 1,
+      .version = 2,
       .synopsis = "constants of the fast tissue model, fitted to finite elements",
       .description =
           "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "

@@ -8,11 +8,8 @@
 #include <type_traits>
 
 #include "body_parts.h"
-#include "cutter.h"
-#include "dynamics_kernel.h"
+#include "dynamics_impl.h"
 #include "osteo/base/error.h"
-#include "osteo/data/tet_mesh.h"
-#include "osteo/distance/triangle_tree.h"
 
 namespace osteo {
 
@@ -70,70 +67,6 @@ constexpr std::uint64_t kObstacleSteps = 10, kTieSteps = 200, kCertifySteps = 10
 const char* tissue_simd_name() {
   return chosen() == Isa::avx512 ? "avx512" : chosen() == Isa::avx2 ? "avx2" : "base";
 }
-
-template <class Real>
-struct TissueDynamics<Real>::Impl {
-  TissueModel model;
-  DynamicsOptions options;
-  double dt = 0;
-  std::vector<Real> x, y, z, px, py, pz, fx, fy, fz;  // now, before, force
-  std::vector<Real> inverse_mass;                     // 1 / (N s2 / mm); 0: fixed
-  std::vector<Real> lx, ly, lz;                       // load
-  std::vector<double> mass, edge_row;
-  std::vector<bool> fixed;
-  std::vector<Slider> sliders;
-  std::vector<std::uint32_t> edge, face, voxel[2], tet;
-  std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
-  tissue::Arrays<Real> arrays;
-  RigidContact tool, obstacle;
-  std::vector<std::uint32_t> surface;  // points of the body's boundary
-  std::vector<bool> surface_point;     // of all points
-  std::vector<bool> tied;              // of all points: to its place in the obstacle
-  std::vector<std::uint32_t> ties;     // those
-  struct Plane {
-    std::uint32_t point;
-    Vec3 normal;
-    double offset;  // pushes where normal . x < offset
-  };
-  std::vector<Plane> planes;
-  double margin = 0;  // nearer to the obstacle than this a point gets a plane
-  std::uint64_t steps = 0, tool_steps = 0, since_certified = 0;
-  std::unique_ptr<Cutter> cutter;  // once something was cut
-  double load_size = 0;
-  int met = 0;
-  Counts counts;
-
-  Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
-  void lay_out();
-  double certify();
-  void certify_again();
-  template <class At>
-  void rows(bool edges, const At& place, std::vector<double>& row) const;
-  Vec3 forces();
-  // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
-  [[nodiscard]] double room(std::uint32_t p) const {
-    return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
-  }
-  // The obstacle on a point: `deep` above 0, along `out`.
-  void push(std::uint32_t p, double deep, Vec3 out);
-  void add(std::uint32_t p, Vec3 f) {
-    fx[p] += static_cast<Real>(f.x);
-    fy[p] += static_cast<Real>(f.y);
-    fz[p] += static_cast<Real>(f.z);
-  }
-  [[nodiscard]] Vec3 at(std::uint32_t p) const { return {static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}; }
-  void find_planes();
-  // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
-  // too.
-  std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
-  std::vector<std::uint32_t> near_triangles, near_points;  // those that the tool may reach before it is looked for again
-  std::vector<RigidShape::Ball> tool_balls;
-  void lay_triangles();
-  void find_near();
-  Vec3 push_by_tool();
-  // Points whose place in the obstacle is gone.
-  void untie();
-};
 
 template <class Real>
 void TissueDynamics<Real>::Impl::lay_out() {
@@ -229,7 +162,14 @@ void TissueDynamics<Real>::Impl::certify_again() {
     if (inverse_mass[p] == 0) continue;
     const double needed = row[p] / most;
     if (needed > mass[p]) ++counts.stretched;
+    const Real before = inverse_mass[p];
     inverse_mass[p] = static_cast<Real>(1 / std::max(mass[p], needed));
+    // Heavier it keeps its momentum, lighter its velocity: neither adds energy.
+    const Real keep = std::min(Real(1), inverse_mass[p] / before);
+    if (keep == 1) continue;
+    px[p] = x[p] - (x[p] - px[p]) * keep;
+    py[p] = y[p] - (y[p] - py[p]) * keep;
+    pz[p] = z[p] - (z[p] - pz[p]) * keep;
   }
 }
 
@@ -283,27 +223,6 @@ void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec
   for (std::size_t p = 0; p < m.x.size(); ++p)
     m.load_size =
         std::max(m.load_size, std::hypot(static_cast<double>(m.lx[p]), static_cast<double>(m.ly[p]), static_cast<double>(m.lz[p])));
-}
-
-template <class Real>
-void TissueDynamics<Real>::set_tool(RigidContact tool) {
-  impl_->tool = std::move(tool);
-  impl_->tool_steps = 0;
-  impl_->tool_balls = impl_->tool.shape ? impl_->tool.shape->balls() : std::vector<RigidShape::Ball>{};
-  if (!impl_->tool_balls.empty() && impl_->triangles.empty()) impl_->lay_triangles();
-}
-
-template <class Real>
-void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
-  Impl& m = *impl_;
-  m.obstacle = std::move(obstacle);
-  m.planes.clear();
-  m.ties.clear();
-  m.tied.assign(m.x.size(), false);
-  m.steps = 0;
-  if (!m.obstacle.shape) return;
-  m.ties = points_inside(*m.obstacle.shape, m.model.rest(), m.surface);
-  for (const std::uint32_t p : m.ties) m.tied[p] = true;
 }
 
 template <class Real>
@@ -362,109 +281,6 @@ std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
 }
 
 template <class Real>
-void TissueDynamics<Real>::Impl::push(std::uint32_t p, double deep, Vec3 out) {
-  const double most = room(p);
-  if (obstacle.stiffness_n_per_mm > most) ++counts.softened;
-  add(p, out * (std::min(obstacle.stiffness_n_per_mm, most) * deep));
-}
-
-template <class Real>
-void TissueDynamics<Real>::Impl::lay_triangles() {
-  TetMesh mesh;
-  for (const Vec3& p : model.rest()) mesh.points_mm.push_back(to_floats(p));
-  for (std::uint32_t t = 0; t < model.tets().size(); ++t) {
-    if (!cutter || cutter->there(t)) mesh.tets.push_back(model.tets()[t]);
-  }
-  std::vector<std::uint32_t> point_of;
-  const TriMesh boundary = boundary_of(mesh, &point_of);
-  triangles.clear();
-  for (const auto& t : boundary.triangles) triangles.push_back({point_of[t[0]], point_of[t[1]], point_of[t[2]]});
-}
-
-template <class Real>
-void TissueDynamics<Real>::Impl::find_near() {
-  near_triangles.clear();
-  near_points.clear();
-  const RigidShape::Ball ball = tool.shape->bounds();
-  // Triangles reach beyond their first point, and things move.
-  const double reach = ball.radius_mm + 8 * margin;
-  const auto close = [&](std::uint32_t p) {
-    const Vec3 off = at(p) - ball.centre_mm;
-    return dot(off, off) < reach * reach;
-  };
-  for (std::uint32_t p = 0; p < x.size(); ++p) {
-    if (mass[p] > 0 && close(p) && !(cutter && cutter->tets_of_point(p) == 0)) near_points.push_back(p);
-  }
-  for (std::uint32_t t = 0; t < triangles.size() && !tool_balls.empty(); ++t) {
-    if (close(triangles[t][0])) near_triangles.push_back(t);
-  }
-}
-
-template <class Real>
-Vec3 TissueDynamics<Real>::Impl::push_by_tool() {
-  Vec3 on_tool{};
-  // A point has about six triangles, each of which may push all of it; and itself.
-  const auto stiffness = [&](double most) {
-    if (tool.stiffness_n_per_mm > most / 7) ++counts.softened;
-    return std::min(tool.stiffness_n_per_mm, most / 7);
-  };
-  for (const std::uint32_t p : near_points) {
-    Vec3 out;
-    const double d = tool.shape->distance_mm(at(p), out);
-    if (!(d < 0) || (surface_point[p] && !tool_balls.empty())) continue;
-    ++met;
-    const Vec3 f = out * (stiffness(room(p)) * -d);
-    add(p, f);
-    on_tool -= f;
-  }
-  for (const std::uint32_t t : near_triangles) {
-    const auto& q = triangles[t];
-    const Vec3 a = at(q[0]), u = at(q[1]) - a, v = at(q[2]) - a, area = cross(u, v);
-    const double square = dot(area, area);
-    if (!(square > 0)) continue;
-    for (const RigidShape::Ball& ball : tool_balls) {
-      const ClosestPoint c = closest_on_triangle(ball.centre_mm, a, a + u, a + v);
-      if (!(c.distance_mm < ball.radius_mm) || !(c.distance_mm > 0)) continue;
-      ++met;
-      Vec3 out = (c.point_mm - ball.centre_mm) / c.distance_mm;
-      // A tool outside pushes the surface inwards. Where its nearest side lies the other way it has sunk in by more than half: without this
-      // the surface would slip past it.
-      const Vec3 normal = area / std::sqrt(square);
-      out -= normal * (2 * std::max(0.0, dot(out, normal)));
-      const Vec3 f = out * (stiffness(std::min({room(q[0]), room(q[1]), room(q[2])})) * (ball.radius_mm - c.distance_mm));
-      const Vec3 w = c.point_mm - a;
-      const double b1 = dot(cross(w, v), area) / square, b2 = dot(cross(u, w), area) / square;
-      add(q[0], f * (1 - b1 - b2));
-      add(q[1], f * b1);
-      add(q[2], f * b2);
-      on_tool -= f;
-    }
-  }
-  return on_tool;
-}
-
-template <class Real>
-void TissueDynamics<Real>::Impl::untie() {
-  const auto still = points_inside(*obstacle.shape, model.rest(), ties);
-  if (still.size() == ties.size()) return;
-  for (const std::uint32_t p : ties) tied[p] = false;
-  for (const std::uint32_t p : still) tied[p] = true;
-  ties = still;
-}
-
-template <class Real>
-void TissueDynamics<Real>::Impl::find_planes() {
-  planes.clear();
-  for (const std::uint32_t p : surface) {
-    if (inverse_mass[p] == 0 || tied[p]) continue;
-    const Vec3 here = at(p);
-    Vec3 out;
-    const double d = obstacle.shape->distance_mm(here, out);
-    if (d < margin) planes.push_back({p, out, dot(out, here) - d});
-  }
-}
-
-template <class Real>
 Vec3 TissueDynamics<Real>::Impl::forces() {
   static const auto function = force_function<Real>();
   std::copy(lx.begin(), lx.end(), fx.begin());
@@ -474,18 +290,7 @@ Vec3 TissueDynamics<Real>::Impl::forces() {
   Vec3 on_tool{};
   met = 0;
   if (tool.shape) on_tool = push_by_tool();
-  for (const Plane& q : planes) {
-    // Not all of a great depth at once, and with half of critical damping: who comes out of bone is not thrown.
-    const double deep = std::min(q.offset - dot(q.normal, at(q.point)), margin);
-    if (!(deep > 0)) continue;
-    const double k = std::min(obstacle.stiffness_n_per_mm, room(q.point));
-    const Vec3 before{static_cast<double>(px[q.point]), static_cast<double>(py[q.point]), static_cast<double>(pz[q.point])};
-    const double slows = dot(q.normal, at(q.point) - before) / dt * std::sqrt(mass[q.point] / k);
-    push(q.point, std::max(0.0, deep - slows), q.normal);
-  }
-  for (const std::uint32_t p : ties) {
-    if (inverse_mass[p] != 0) push(p, 1, model.rest()[p] - at(p));
-  }
+  if (obstacle.shape) push_by_obstacle();
   for (const Slider& q : sliders) {
     for (std::size_t a = 0; a < 3; ++a) {
       if ((q.held >> a & 1) != 0) (a == 0 ? fx : a == 1 ? fy : fz)[q.point] = 0;

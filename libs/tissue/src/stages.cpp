@@ -14,15 +14,15 @@ using namespace tissue;
 
 StageInfo FemStage::info() {
   return {.name = "fem",
-          .version = 1,
+          .version = 2,
           .synopsis = "how a soft body deforms under a load, by finite elements",
           .description =
               "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse Cholesky. Linear "
               "elasticity, Saint "
-              "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 2e-7 "
+              "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 1e-6 "
               "where that "
               "has the same law. Reads and writes input files of CalculiX and Abaqus: give one .inp as mesh and as problem.",
-          .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it"},
+          .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it, or .inp"},
                      {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"}},
           .outputs = {{"deformed", {DataKind::tets}, "the same mesh under the load"},
                       {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
@@ -77,7 +77,7 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
 StageInfo SimulateStage::info() {
   return {
       .name = "simulate",
-      .version = 1,
+      .version = 2,
       .synopsis = "a soft body in time, by the fast distance and volume model",
       .description =
           "Explicit steps with a limit that is certified, or implicit ones of any length for stiff bodies; lumped masses, viscous damping. "

@@ -8,6 +8,7 @@
 #include "osteo/base/files.h"
 #include "osteo/image/phantom.h"
 #include "osteo/io/surface_io.h"
+#include "osteo/io/tet_io.h"
 #include "osteo/io/volume_io.h"
 
 namespace osteo {
@@ -126,6 +127,21 @@ TEST(Surface, FormatsKeepPointsAndTriangles) {
     EXPECT_EQ(back->triangles.size(), 2u) << suffix;
     EXPECT_NEAR(area_mm2(*back), area_mm2(mesh), 1e-4) << suffix;
   }
+}
+
+TEST(Tets, ValuesAtPointsSurviveInVtu) {
+  TetMesh mesh;
+  for (const auto& p : {std::array<float, 3>{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}) mesh.points_mm.push_back(p);
+  mesh.tets.push_back({0, 1, 2, 3});
+  mesh.values = {1, 20.5F, 1e-3F, 1e6F};
+  mesh.values_name = "stiffness_kpa";
+  save_tets(mesh, folder() / "values.vtu");
+  const Tets back = load_tets(folder() / "values.vtu");
+  EXPECT_EQ(back->values, mesh.values);
+  EXPECT_EQ(back->values_name, mesh.values_name);
+  mesh.values.clear();
+  save_tets(mesh, folder() / "plain.vtu");
+  EXPECT_TRUE(load_tets(folder() / "plain.vtu")->values.empty());
 }
 
 }  // namespace

@@ -100,6 +100,37 @@ TEST(Contact, WhatLiesInsideAtRestIsTiedToIt) {
   for (std::size_t p = 0; p < x.size(); ++p) EXPECT_LT(length(d.positions_mm()[p] - b.points[p]), 1);
 }
 
+// Pressed four tenths of its thickness deep by a large ball it lies still: contact takes energy out, it never puts any in; and let go it
+// comes back.
+TEST(Contact, PressedDeepItLiesStill) {
+  const auto b = test::block(10, 10, 5, 1.5);
+  const Material m{0.02, 0.45};
+  TissueModel model = TissueModel::of_voxels(b.points, b.tets, std::span(&m, 1));
+  model.scale({1, 1, 0, 1});
+  std::vector<std::uint32_t> fixed;
+  for (std::uint32_t p = 0; p < b.points.size(); ++p) {
+    if (b.points[p].z < 1e-9) fixed.push_back(p);
+  }
+  TissueDynamics<float> d(model, fixed, {.density_kg_m3 = 1000, .damping_per_s = 60, .step_share = 0.75});
+  Vec3 force{};
+  double last = 0;
+  for (int n = 0; n <= 100; ++n) {
+    d.set_tool({std::make_shared<BallShape>(Vec3{7.5, 7.5, 7.5 + 3 - 0.03 * n}, 3), 0.1});
+    force = d.step(100);
+    if (n % 20 == 0) {
+      EXPECT_GE(force.z, last);
+      last = force.z;
+    }
+  }
+  EXPECT_GT(force.z, 0.05);
+  EXPECT_LT(std::hypot(force.x, force.y), 0.1 * force.z);
+  d.step(2000);
+  EXPECT_LT(d.kinetic_mj(), 0.01 * d.elastic_mj());
+  d.set_tool({});
+  d.step(20000);
+  for (std::size_t p = 0; p < b.points.size(); ++p) EXPECT_LT(length(d.positions_mm()[p] - b.points[p]), 0.05);
+}
+
 // A stiffness that the step has no room for is cut, and counted.
 TEST(Contact, SofteningIsCounted) {
   const auto b = test::block(3, 3, 2, 2.0);

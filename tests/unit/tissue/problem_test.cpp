@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "block.h"
 #include "osteo/base/error.h"
 #include "osteo/io/inp_io.h"
@@ -144,6 +146,32 @@ a tetrahedron, and one on it
   const double side = dot(area, Vec3{1, 0, 0} - a) > 0 ? 1 : -1;
   const Vec3 expected = area * (0.002 * side) + Vec3{0, 0, -1e-3};
   EXPECT_LT(length(total - expected), 1e-12);
+  // Damaged in any way it is read or refused, never anything else.
+  std::mt19937 random(8);
+  for (int n = 0; n < 20000; ++n) {
+    std::string damaged = text;
+    for (std::uint32_t k = random() % 4 + 1; k > 0 && !damaged.empty(); --k) {
+      const std::size_t at = random() % damaged.size();
+      switch (random() % 4) {
+        case 0:
+          damaged[at] = static_cast<char>(random() % 96 + 32);
+          break;
+        case 1:
+          damaged.erase(at, random() % 20);
+          break;
+        case 2:
+          damaged.insert(at, damaged.substr(random() % damaged.size(), random() % 30));
+          break;
+        default:
+          damaged[at] = "0123456789,.*-=e\n"[random() % 17];
+      }
+    }
+    try {
+      const TetMesh other = parse_inp(damaged, "x").mesh;
+      static_cast<void>(parse_tissue_problem(damaged, other, false));
+    } catch (const Error&) {
+    }
+  }
   const auto says = [&](const std::string& from, const std::string& to, const std::string& what) {
     std::string changed = text;
     changed.replace(changed.find(from), from.size(), to);

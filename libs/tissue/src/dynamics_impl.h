@@ -1,0 +1,84 @@
+// The inside of TissueDynamics: the body in its arrays (dynamics.cpp) and what it meets (dynamics_contact.cpp).
+#pragma once
+#include <cmath>
+#include <memory>
+
+#include "cutter.h"
+#include "dynamics_kernel.h"
+#include "osteo/tissue/dynamics.h"
+
+namespace osteo {
+
+template <class Real>
+struct TissueDynamics<Real>::Impl {
+  TissueModel model;
+  DynamicsOptions options;
+  double dt = 0;
+  std::vector<Real> x, y, z, px, py, pz, fx, fy, fz;  // now, before, force
+  std::vector<Real> inverse_mass;                     // 1 / (N s2 / mm); 0: fixed
+  std::vector<Real> lx, ly, lz;                       // load
+  std::vector<double> mass, edge_row;
+  std::vector<bool> fixed;
+  std::vector<Slider> sliders;
+  std::vector<std::uint32_t> edge, face, voxel[2], tet;
+  std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
+  tissue::Arrays<Real> arrays;
+  // Contact (dynamics_contact.cpp).
+  RigidContact tool, obstacle;
+  std::vector<std::uint32_t> surface;  // points of the body's boundary
+  std::vector<bool> surface_point;     // of all points
+  std::vector<bool> tied;              // of all points: to its place in the obstacle
+  std::vector<std::uint32_t> ties;     // those
+  struct Plane {
+    std::uint32_t point;
+    Vec3 normal;
+    double offset;  // pushes where normal . x < offset
+  };
+  std::vector<Plane> planes;
+  // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
+  // too.
+  std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
+  std::vector<std::uint32_t> triangles_of;                 // of each point: how many
+  std::vector<std::uint32_t> near_triangles, near_points;  // those that the tool may reach before it is looked for again
+  std::vector<RigidShape::Ball> tool_balls;
+  double margin = 0;  // nearer to the obstacle than this a point gets a plane
+  std::uint64_t steps = 0, tool_steps = 0, since_certified = 0;
+  std::unique_ptr<tissue::Cutter> cutter;  // once something was cut
+  double load_size = 0;
+  int met = 0;
+  Counts counts;
+
+  Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
+  void lay_out();
+  double certify();
+  void certify_again();
+  template <class At>
+  void rows(bool edges, const At& place, std::vector<double>& row) const;
+  Vec3 forces();
+  // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
+  [[nodiscard]] double room(std::uint32_t p) const {
+    return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
+  }
+  // The obstacle on a point: `deep` above 0, along `out`.
+  void push(std::uint32_t p, double deep, Vec3 out);
+  void add(std::uint32_t p, Vec3 f) {
+    fx[p] += static_cast<Real>(f.x);
+    fy[p] += static_cast<Real>(f.y);
+    fz[p] += static_cast<Real>(f.z);
+  }
+  [[nodiscard]] Vec3 at(std::uint32_t p) const { return {static_cast<double>(x[p]), static_cast<double>(y[p]), static_cast<double>(z[p])}; }
+  // Half of critical damping, as a depth less: velocity along `out` times the root of m / k.
+  [[nodiscard]] double slowed(std::uint32_t p, double k, Vec3 out) const {
+    const Vec3 before{static_cast<double>(px[p]), static_cast<double>(py[p]), static_cast<double>(pz[p])};
+    return dot(out, at(p) - before) / dt * std::sqrt(mass[p] / k);
+  }
+  void find_planes();
+  void lay_triangles();
+  void find_near();
+  Vec3 push_by_tool();
+  void push_by_obstacle();
+  // Points whose place in the obstacle is gone.
+  void untie();
+};
+
+}  // namespace osteo
