@@ -48,7 +48,7 @@ _osteo() {
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
     fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out" ;;
-    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --deformed-out --map-out --course-out" ;;
+    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --deformed-out --map-out --course-out" ;;
     simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
     pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;

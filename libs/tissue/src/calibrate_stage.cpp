@@ -72,6 +72,41 @@ ordered_json learnt(const TissueProblem& problem, const TissueModel& model, std:
   return all;
 }
 
+// Each tetrahedron as eight; its points come first and keep their numbers.
+struct Finer {
+  std::vector<Vec3> points;
+  std::vector<std::array<std::uint32_t, 4>> tets;
+  std::vector<Material> materials;
+};
+Finer finer(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, std::span<const Material> materials) {
+  Finer f{{points.begin(), points.end()}, {}, {}};
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t> middles;
+  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+    const auto [it, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(f.points.size()));
+    if (fresh) f.points.push_back((points[a] + points[b]) / 2);
+    return it->second;
+  };
+  for (std::size_t t = 0; t < tets.size(); ++t) {
+    const auto [a, b, c, d] = tets[t];
+    const std::uint32_t ab = middle(a, b), ac = middle(a, c), ad = middle(a, d), bc = middle(b, c), bd = middle(b, d), cd = middle(c, d);
+    for (std::array<std::uint32_t, 4> q : {std::array{a, ab, ac, ad},
+                                           {ab, b, bc, bd},
+                                           {ac, bc, c, cd},
+                                           {ad, bd, cd, d},
+                                           {ab, ac, ad, bd},
+                                           {ab, bc, ac, bd},
+                                           {ac, bc, cd, bd},
+                                           {ac, cd, ad, bd}}) {
+      const Vec3 o = f.points[q[0]];
+      if (dot(f.points[q[1]] - o, cross(f.points[q[2]] - o, f.points[q[3]] - o)) < 0) std::swap(q[2], q[3]);
+      f.tets.push_back(q);
+      if (materials.size() > 1) f.materials.push_back(materials[t]);
+    }
+  }
+  if (materials.size() == 1) f.materials.assign(1, materials[0]);
+  return f;
+}
+
 }  // namespace
 
 StageInfo CalibrateStage::info() {
@@ -84,7 +119,8 @@ StageInfo CalibrateStage::info() {
           "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
           "(Ceres). The "
           "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
-          "against quadratic tetrahedra); uncertain factors; the course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
+          "against quadratic tetrahedra, and with --check-truth finer ones: a residual below that says nothing); uncertain factors; the "
+          "course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
           "regions of "
           "a body are made of, also without being told of them (--blind).",
       .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
@@ -131,6 +167,26 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
     context.progress(0.5 * static_cast<double>(n) / static_cast<double>(problem.loads.size()), "finite elements");
     truth.push_back(solve(true_body, problem.loads[n]));
     doubt.push_back(calibration_error(points, solve(other_body, problem.loads[n]), truth.back()).nrms);
+  }
+  std::vector<double> doubt_finer;
+  if (p.check_truth) {
+    const Finer fine = finer(points, tets, problem.materials);
+    const FemBody fine_body(fine.points, fine.tets, fine.materials, elements.law, elements.order);
+    // Held where both ends of an edge were held, forces in the middle of edges there: as quadratic tetrahedra take them.
+    const FemBody coarse = body(TetOrder::t10);
+    std::vector<std::uint32_t> place(coarse.point_count());
+    std::map<std::array<double, 3>, std::uint32_t> at;
+    for (std::uint32_t q = 0; q < fine.points.size(); ++q) at[{fine.points[q].x, fine.points[q].y, fine.points[q].z}] = q;
+    for (std::uint32_t q = 0; q < place.size(); ++q) place[q] = at.at({coarse.rest()[q].x, coarse.rest()[q].y, coarse.rest()[q].z});
+    for (std::size_t n = 0; n < problem.loads.size(); ++n) {
+      context.progress(0.5, "finite elements half as large");
+      TissueLoad load = coarse.on_all_points(problem.loads[n]);
+      for (auto& [q, f] : load.forces_n) q = place[q];
+      for (std::uint32_t& q : load.fixed) q = place[q];
+      for (Slider& q : load.sliders) q.point = place[q.point];
+      const auto x = solve(fine_body, load);
+      doubt_finer.push_back(calibration_error(points, {truth[n].data(), points.size()}, {x.data(), points.size()}).nrms);
+    }
   }
   std::vector<CalibrationCase> cases;
   for (const std::size_t n : fitted)
@@ -185,11 +241,14 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
                           {"rms_mm", a.rms_mm},
                           {"felt_stiffer_by", force_error(points, after.points_mm, truth[n], problem.loads[n])},
                           {"at_rest", after.converged}});
+    if (p.check_truth) j["loads"].back()["truth_off_finer"] = doubt_finer[n];
     if (!used) unseen = std::max(unseen, a.nrms);
   }
   context.report("nrms", c.after.front().nrms);
   context.report("closed_form_nrms", c.before.front().nrms);
   context.report("worst_nrms_not_fitted", unseen);
+  context.report("truth_off_other_order", doubt[fitted.front()]);
+  if (p.check_truth) context.report("truth_off_finer", doubt_finer[fitted.front()]);
   context.report("equilibrium_solves", static_cast<std::int64_t>(c.solves));
   context.progress(1);
   const std::string title = std::to_string(c.parameters) + " factors in " + std::to_string(c.solves) + " equilibrium solves, " +

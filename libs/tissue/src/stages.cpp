@@ -110,7 +110,9 @@ Course go_on(Dynamics& dynamics, const SimulateParams& p, int batch, const Conte
   const bool tool = p.tool_radius_mm > 0;
   while (c.done < steps && !c.at_rest) {
     const double share = static_cast<double>(c.done) / static_cast<double>(steps), way = std::min(1.0, 2 * share);
-    if (tool) dynamics.set_tool({std::make_shared<BallShape>(from + (to - from) * way, p.tool_radius_mm), p.tool_stiffness_n_per_mm});
+    // By points, as its stiffness is meant, so that both ways find the same.
+    if (tool)
+      dynamics.set_tool({std::make_shared<BallShape>(from + (to - from) * way, p.tool_radius_mm, false), p.tool_stiffness_n_per_mm});
     const int now = static_cast<int>(std::min<long>(tool ? std::max(1, batch / 10) : batch, steps - c.done));
     const Vec3 force = dynamics.step(now);
     c.done += now;

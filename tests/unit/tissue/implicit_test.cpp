@@ -149,22 +149,11 @@ TEST(Implicit, StiffBodies) {
   }
 }
 
-// A ball that is met by points alone, as implicit steps meet all tools.
-class PlainBall final : public RigidShape {
- public:
-  explicit PlainBall(const BallShape& ball) : ball_(ball) {}
-  [[nodiscard]] Ball bounds() const override { return ball_.bounds(); }
-  double distance_mm(Vec3 at, Vec3& outwards) const override { return ball_.distance_mm(at, outwards); }
-
- private:
-  BallShape ball_;
-};
-
 TEST(Implicit, ToolAndObstacleAsExplicitStepsFindThem) {
   const auto b = block(5, 5, 3, 2.0);
   const TissueModel model = model_of(b, {0.05, 0.45});
   const auto fixed = base_of(b);
-  const RigidContact tool{std::make_shared<PlainBall>(BallShape({5, 5, 8}, 3)), 0.02},
+  const RigidContact tool{std::make_shared<BallShape>(Vec3{5, 5, 8}, 3, false), 0.02},
       wall{std::make_shared<BallShape>(Vec3{16, 5, 4}, 6.5), 0.05};
   TissueDynamics<double> quick(model, fixed, {.damping_per_s = 300});
   ImplicitDynamics slow(model, fixed, {.damping_per_s = 300, .step_s = 0.02});

@@ -27,13 +27,15 @@ class RigidShape {
 
 class BallShape final : public RigidShape {
  public:
-  BallShape(Vec3 centre_mm, double radius_mm) : ball_{centre_mm, radius_mm} {}
+  /// `triangles` false: points alone meet it.
+  BallShape(Vec3 centre_mm, double radius_mm, bool triangles = true) : ball_{centre_mm, radius_mm}, triangles_(triangles) {}
   [[nodiscard]] Ball bounds() const override { return ball_; }
   double distance_mm(Vec3 at, Vec3& outwards) const override;
-  [[nodiscard]] std::vector<Ball> balls() const override { return {ball_}; }
+  [[nodiscard]] std::vector<Ball> balls() const override { return triangles_ ? std::vector{ball_} : std::vector<Ball>{}; }
 
  private:
   Ball ball_;
+  bool triangles_;
 };
 
 /// A closed surface by its distance map (exact at the map's points, linear between) over a box; outside the box it is not felt.

@@ -59,6 +59,7 @@ struct CalibrateParams {
   int starts = 1;
   int samples = 0;
   int iterations = 60;
+  bool check_truth = false;
 };
 struct CalibrateStage {
   using Params = CalibrateParams;
@@ -76,6 +77,7 @@ struct CalibrateStage {
     visit({"starts", "from other mixtures too; the best counts", "", 1, 3}, p.starts);
     visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000}, p.samples);
     visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
+    visit({"check_truth", "solve finite elements half as large too (eight times as many): how far the truth is off itself"}, p.check_truth);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
