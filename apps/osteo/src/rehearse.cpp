@@ -319,7 +319,19 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
       return soft->memory_bytes();
     });
     if (soft->slow_motion() < 0.99)
-      io.context.warn("soft tissue runs at " + format_number(std::round(100 * soft->slow_motion())) + " % of real time");
+      io.context.warn("soft tissue runs at " + format_number(std::round(100 * soft->slow_motion())) +
+                      " % of real time: it will feel sluggish; larger voxels make it quicker");
+    soft->meet(&*world);
+    const SoftTool tool{soft->points_mm().front(), {0, 0, 1}, 0, false};
+    constexpr int kUpdates = 20;
+    const std::int64_t begin = monotonic_ns();
+    for (int n = 0; n < kUpdates; ++n) static_cast<void>(soft->update(tool));
+    const double ms = static_cast<double>(monotonic_ns() - begin) / 1e6 / kUpdates;
+    soft->meet(nullptr);
+    j["soft_tissue"] = {{"update_ms", ms}, {"updates_per_s", SoftBody::kUpdatesPerS}, {"of_real_time", soft->slow_motion()}};
+    if (ms > 1000 / SoftBody::kUpdatesPerS)
+      io.context.warn("an update of soft tissue takes " + format_number(std::round(10 * ms) / 10) + " ms of the " +
+                      format_number(1000 / SoftBody::kUpdatesPerS) + " it has");
   }
   std::unique_ptr<HapticRenderer> renderer;
   HapticScene touched;

@@ -39,7 +39,8 @@ class SoftBody {
   /// The bone that it meets from now on, as it lies at rest; null: none. The world must stay until another is set.
   void meet(const World* world);
   /// Goes on by one update with the tool there; the plane that it pushes with now, or nothing when it pushed neither before nor
-  /// now. Simulated time goes slower than the clock's when a hundredth of a second needs more steps than it may take: see slow_motion().
+  /// now. Simulated time goes slower than the clock's when a hundredth of a second needs more steps than it may take: see slow_motion(); at
+  /// a quarter of real time it is as if it were sixteen times as heavy.
   std::optional<SceneAction> update(const SoftTool& tool);
 
   [[nodiscard]] std::vector<Vec3> points_mm() const;
