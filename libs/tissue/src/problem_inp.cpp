@@ -115,9 +115,16 @@ class Reader {
   }
 
   void boundary(const InpCard& card) {
+    // Abaqus' names; turning, which points do not, is left out.
+    static const std::map<std::string, std::array<double, 2>> kNamed{
+        {"ENCASTRE", {1, 3}}, {"PINNED", {1, 3}}, {"XSYMM", {1, 1}}, {"YSYMM", {2, 2}}, {"ZSYMM", {3, 3}}};
     for (const auto& row : card.rows) {
       if (row.size() < 2) throw fail(card, "a line holds less than a node and an axis");
-      const double first = number_of(card, row[1]), last = row.size() > 2 && !row[2].empty() ? number_of(card, row[2]) : first;
+      const auto named = kNamed.find(row[1]);
+      const double first = named != kNamed.end() ? named->second[0] : number_of(card, row[1]),
+                   last = named != kNamed.end()               ? named->second[1]
+                          : row.size() > 2 && !row[2].empty() ? number_of(card, row[2])
+                                                              : first;
       if (row.size() > 3 && number_of(card, row[3]) != 0) throw fail(card, "points that are moved by it are not read, only held ones");
       if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
       for (const long node : members(card, file_.node_sets, row[0])) {

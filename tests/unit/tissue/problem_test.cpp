@@ -146,6 +146,12 @@ a tetrahedron, and one on it
   const double side = dot(area, Vec3{1, 0, 0} - a) > 0 ? 1 : -1;
   const Vec3 expected = area * (0.002 * side) + Vec3{0, 0, -1e-3};
   EXPECT_LT(length(total - expected), 1e-12);
+  std::string named = text;
+  named.replace(named.find(" base, 1, 3"), 11, " base, PINNED\n 13, zsymm");
+  const TissueProblem q = parse_tissue_problem(named, mesh);
+  EXPECT_EQ(q.fixed, p.fixed);
+  ASSERT_EQ(q.sliders.size(), 1u);
+  EXPECT_EQ(q.sliders[0].held, 4);
   // Damaged in any way it is read or refused, never anything else.
   std::mt19937 random(8);
   for (int n = 0; n < 20000; ++n) {
