@@ -77,8 +77,10 @@ std::optional<SceneAction> Rehearsal::move_soft() {
   const TickRecord& now = follower_->latest();
   if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
-  return options_.soft->update(
+  const auto yield = options_.soft->update(
       {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.device.drill_on != 0});
+  tissue_mm3_ = options_.soft->cut_off_mm3();
+  return yield;
 }
 
 void Rehearsal::act(const SceneAction& action) {
@@ -170,6 +172,7 @@ RehearsalSummary Rehearsal::finish() {
   s.ticks = operation_.ticks();
   s.removed_mm3 = recorder_ ? recorder_->removed_mm3() : removed_mm3_.load();
   s.sawn_mm3 = follower_->sawn_mm3();
+  s.tissue_mm3 = tissue_mm3_;
   s.bone_hash = operation_.world().hash();
   s.surface_hash = follower_->surface_hash();
   if (reader_ != nullptr) s.dropped = reader_->dropped;

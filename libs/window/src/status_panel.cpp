@@ -45,6 +45,7 @@ void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
   if ((tick.flags & kEscape) != 0) ImGui::TextColored(kRed, "the burr is buried in bone");
   if (rehearsal.pieces() > 1) ImGui::Text("The bone is in %d pieces", rehearsal.pieces());
   ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
+  if (rehearsal.soft() != nullptr) ImGui::Text("Tissue cut off  %.1f mm3", rehearsal.tissue_mm3());
   const double seconds = static_cast<double>(tick.tick) / rehearsal.rate_hz();
   ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
 }

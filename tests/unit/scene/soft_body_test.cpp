@@ -108,7 +108,8 @@ TEST(SoftBody, ATurningBurrCutsVoxelsOff) {
     s.tool = burr_index(BurrKind::cutting, 6);
     for (auto& w : s.waypoints) w.drill_on = true;
     Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(s, 1000), o, {});
-    r.run_to_end({});
+    const RehearsalSummary summary = r.run_to_end({});
+    EXPECT_EQ(summary.tissue_mm3, o.soft->cut_off_mm3());
     EXPECT_GT(o.soft->version(), version);
     const TriMesh& drawn = o.soft->drawn();
     EXPECT_NE(drawn.triangles.size(), triangles);

@@ -31,6 +31,7 @@ struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;  ///< by the burr
   double sawn_mm3 = 0;     ///< by the saw, and crumbs of splits
+  double tissue_mm3 = 0;   ///< soft tissue cut off, as at rest
   std::string bone_hash, surface_hash;
   std::uint64_t dropped = 0;  ///< ticks that a reader lost
   std::uint64_t session_bytes = 0;
@@ -68,6 +69,8 @@ class Rehearsal {
   /// Latest tick, for display.
   [[nodiscard]] TickRecord latest() const { return latest_.load(); }
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
+  /// Soft tissue cut off; 0 where the scene has none.
+  [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
   /// Parts that hang together, of at least Follower::kLeastPieceMm3, as last seen; 0 unless they are followed.
   [[nodiscard]] int pieces() const { return pieces_; }
@@ -96,7 +99,7 @@ class Rehearsal {
   StreamReader* reader_ = nullptr;
   Operation operation_;
   Seqlock<TickRecord> latest_;
-  std::atomic<double> removed_mm3_{0};
+  std::atomic<double> removed_mm3_{0}, tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
   std::mutex mutex_;  // of world and follower
