@@ -169,15 +169,6 @@ void throughput() {
   std::printf("\n");
 }
 
-double off(std::span<const Vec3> a, std::span<const Vec3> b, std::span<const Vec3> rest) {
-  double sum = 0, size = 0;
-  for (std::size_t p = 0; p < a.size(); ++p) {
-    sum += dot(a[p] - b[p], a[p] - b[p]);
-    size += dot(b[p] - rest[p], b[p] - rest[p]);
-  }
-  return std::sqrt(sum / size);
-}
-
 // A post, plucked: where it is after a tenth of a second, by steps of many lengths, against explicit ones of a fiftieth of the limit.
 void time_steps() {
   const auto b = test::block(6, 6, 12, 5);
@@ -207,12 +198,13 @@ void time_steps() {
     for (const double share : {0.25, 0.5, 0.9}) {
       const auto [x, h, s, heavier] = explicit_run(share, 0);
       certified = h;
-      std::printf("| explicit, %.2f of the limit | %.4f | %.2g | %.2f | |\n", share, 1000 * h, off(x, truth, b.points), s / kEnd);
+      std::printf("| explicit, %.2f of the limit | %.4f | %.2g | %.2f | |\n", share, 1000 * h, calibration_error(b.points, x, truth).nrms,
+                  s / kEnd);
     }
     for (const double times : {2.0, 4.0}) {
       const auto [x, h, s, heavier] = explicit_run(0.9, times * certified);
-      std::printf("| explicit, heavier | %.4f | %.2g | %.2f | %llu points made heavier |\n", 1000 * h, off(x, truth, b.points), s / kEnd,
-                  static_cast<unsigned long long>(heavier));
+      std::printf("| explicit, heavier | %.4f | %.2g | %.2f | %llu points made heavier |\n", 1000 * h,
+                  calibration_error(b.points, x, truth).nrms, s / kEnd, static_cast<unsigned long long>(heavier));
     }
     for (const double ms : {0.25, 1.0, 4.0, 10.0}) {
       for (const int iterations : {1, 30}) {
@@ -222,7 +214,7 @@ void time_steps() {
         const int steps = static_cast<int>(std::lround(kEnd / d.step_s()));
         d.step(steps);
         std::printf("| implicit, %s | %.4f | %.2g | %.2f | %.1f iterations a step |\n", iterations == 1 ? "one iteration" : "to its end",
-                    ms, off(d.positions_mm(), truth, b.points), (now_s() - begin) / kEnd,
+                    ms, calibration_error(b.points, d.positions_mm(), truth).nrms, (now_s() - begin) / kEnd,
                     static_cast<double>(d.counts().iterations) / steps);
         std::fflush(stdout);
       }
@@ -296,7 +288,7 @@ void resolution() {
         continue;
       }
       const Found f = solve(n, kind);
-      std::printf(" %.4f | %.2f |", off(in_order(n, f), exact, rest), f.seconds);
+      std::printf(" %.4f | %.2f |", calibration_error(rest, in_order(n, f), exact).nrms, f.seconds);
       std::fflush(stdout);
     }
     std::printf("\n");

@@ -63,11 +63,8 @@ class Parser {
     return {ExitCode::corrupt, "'" + name_ + "', line " + std::to_string(card.line) + ": " + what, advice};
   }
   [[nodiscard]] double number(const InpCard& card, const std::string& field) const {
-    double v = 0;
-    const char* const end = field.data() + field.size();
-    const auto [at, problem] = std::from_chars(field.data() + (field.starts_with('+') ? 1 : 0), end, v);
-    if (problem != std::errc() || at != end || !std::isfinite(v)) throw fail(card, "'" + field + "' under *" + card.name + " is no number");
-    return v;
+    if (const auto v = inp_number(field)) return *v;
+    throw fail(card, "'" + field + "' under *" + card.name + " is no number");
   }
   [[nodiscard]] long whole(const InpCard& card, const std::string& field) const {
     const double v = number(card, field);
@@ -217,6 +214,14 @@ class Parser {
 };
 
 }  // namespace
+
+std::optional<double> inp_number(std::string_view field) {
+  double v = 0;
+  if (field.starts_with('+')) field.remove_prefix(1);
+  const auto [at, problem] = std::from_chars(field.data(), field.data() + field.size(), v);
+  if (problem != std::errc() || at != field.data() + field.size() || !std::isfinite(v)) return std::nullopt;
+  return v;
+}
 
 InpFile parse_inp(std::string_view text, const std::string& name) {
   return Parser(text, name).run();

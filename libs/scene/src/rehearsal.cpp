@@ -64,7 +64,8 @@ void Rehearsal::perform(const SceneAction& action, bool live) {
     drain();
     effect = operation_.act(action, done, components);
   }
-  if (options_.follow.pieces && !action.is(ActionKind::yield)) pieces_ = static_cast<int>(follower_->large_pieces().size());
+  const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
+  if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(follower_->large_pieces().size());
   if (!effect.done) {
     const std::lock_guard lock(queue_mutex_);
     refused_ = std::string(name_of(static_cast<ActionKind>(action.kind))) + ": " + effect.message;

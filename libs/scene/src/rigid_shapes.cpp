@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/grid/brick_linear.h"
+
 namespace osteo {
 
 RigidShape::Ball ToolShape::bounds() const {
@@ -37,14 +39,7 @@ double LiveBone::density(Vec3 at) const {
     const BrickGrid& bone = placed.body->bone;
     const Vec3 x = bone.frame().index_from_world(placed.world_from_body.inverse()(at));
     if (!(std::abs(x.x) < 1e6 && std::abs(x.y) < 1e6 && std::abs(x.z) < 1e6)) continue;
-    const int i = static_cast<int>(std::floor(x.x)), j = static_cast<int>(std::floor(x.y)), k = static_cast<int>(std::floor(x.z));
-    const double u = x.x - i, v = x.y - j, w = x.z - k;
-    double sum = 0;
-    for (int c = 0; c < 8; ++c) {
-      const double share = ((c & 1) != 0 ? u : 1 - u) * ((c & 2) != 0 ? v : 1 - v) * ((c & 4) != 0 ? w : 1 - w);
-      sum += share * static_cast<double>(bone.at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)));
-    }
-    most = std::max(most, sum);
+    most = std::max(most, static_cast<double>(linear_beside(bone, x)));
   }
   return most;
 }

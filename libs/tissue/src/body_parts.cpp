@@ -1,7 +1,10 @@
 #include "body_parts.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
+#include "osteo/base/error.h"
 #include "osteo/data/tet_mesh.h"
 
 namespace osteo::tissue {
@@ -17,14 +20,37 @@ std::vector<double> masses(const TissueModel& model, double density_kg_m3) {
   return mass;
 }
 
-std::vector<std::uint32_t> points_of_boundary(const TissueModel& model) {
+std::vector<std::array<std::uint32_t, 3>> boundary_triangles(const TissueModel& model, const Cutter* cutter) {
   TetMesh mesh;
   for (const Vec3& p : model.rest()) mesh.points_mm.push_back(to_floats(p));
-  for (const auto& t : model.tets()) mesh.tets.push_back(t);
+  for (std::uint32_t t = 0; t < model.tets().size(); ++t) {
+    if (cutter == nullptr || cutter->there(t)) mesh.tets.push_back(model.tets()[t]);
+  }
+  std::vector<std::uint32_t> point_of;
+  const TriMesh boundary = boundary_of(mesh, &point_of);
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const auto& t : boundary.triangles) triangles.push_back({point_of[t[0]], point_of[t[1]], point_of[t[2]]});
+  return triangles;
+}
+
+std::vector<std::uint32_t> points_of(std::span<const std::array<std::uint32_t, 3>> triangles) {
   std::vector<std::uint32_t> points;
-  static_cast<void>(boundary_of(mesh, &points));
+  for (const auto& t : triangles) points.insert(points.end(), t.begin(), t.end());
   std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
   return points;
+}
+
+void require_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n, std::size_t points) {
+  for (const auto& [p, f] : forces_n) {
+    if (p >= points || !std::isfinite(dot(f, f)))
+      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
+  }
+}
+
+std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
 }
 
 std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points) {

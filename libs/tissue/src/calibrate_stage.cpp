@@ -72,39 +72,39 @@ ordered_json learnt(const TissueProblem& problem, const TissueModel& model, std:
   return all;
 }
 
-// Each tetrahedron as eight; its points come first and keep their numbers.
-struct Finer {
-  std::vector<Vec3> points;
-  std::vector<std::array<std::uint32_t, 4>> tets;
-  std::vector<Material> materials;
+// Finite elements under one load after another, all held alike.
+class Statics {
+ public:
+  Statics(const FemBody& body, const TissueLoad& held) : body_(body), solver_(body, body.rest(), held) {}
+  std::vector<Vec3> solve(const TissueLoad& load, const Context& context) {
+    const TissueLoad all = body_.on_all_points(load);
+    Equilibrium r = solver_.solve(body_, body_.rest(), all.forces_n, {1e-10, 100, 1}, context);
+    if (!r.converged) r = solver_.solve(body_, body_.rest(), all.forces_n, {1e-10, 100, 8}, context);
+    if (!r.converged) throw not_at_rest(r, "make the load smaller");
+    return r.points_mm;
+  }
+
+ private:
+  const FemBody& body_;
+  EquilibriumSolver solver_;
 };
-Finer finer(std::span<const Vec3> points, std::span<const std::array<std::uint32_t, 4>> tets, std::span<const Material> materials) {
-  Finer f{{points.begin(), points.end()}, {}, {}};
-  std::map<std::array<std::uint32_t, 2>, std::uint32_t> middles;
-  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-    const auto [it, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<std::uint32_t>(f.points.size()));
-    if (fresh) f.points.push_back((points[a] + points[b]) / 2);
-    return it->second;
-  };
-  for (std::size_t t = 0; t < tets.size(); ++t) {
-    const auto [a, b, c, d] = tets[t];
-    const std::uint32_t ab = middle(a, b), ac = middle(a, c), ad = middle(a, d), bc = middle(b, c), bd = middle(b, d), cd = middle(c, d);
-    for (std::array<std::uint32_t, 4> q : {std::array{a, ab, ac, ad},
-                                           {ab, b, bc, bd},
-                                           {ac, bc, c, cd},
-                                           {ad, bd, cd, d},
-                                           {ab, ac, ad, bd},
-                                           {ab, bc, ac, bd},
-                                           {ac, bc, cd, bd},
-                                           {ac, cd, ad, bd}}) {
-      const Vec3 o = f.points[q[0]];
-      if (dot(f.points[q[1]] - o, cross(f.points[q[2]] - o, f.points[q[3]] - o)) < 0) std::swap(q[2], q[3]);
-      f.tets.push_back(q);
-      if (materials.size() > 1) f.materials.push_back(materials[t]);
+
+// Each tetrahedron as eight, over the points of the quadratic body.
+std::vector<std::array<std::uint32_t, 4>> eight_of_each(const FemBody& quadratic) {
+  // Nodes as of C3D10: corners, then the middles of 01, 12, 02, 03, 13, 23.
+  constexpr std::size_t kParts[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
+                                        {4, 6, 7, 8}, {4, 5, 6, 8}, {6, 5, 9, 8}, {6, 9, 7, 8}};
+  const auto& x = quadratic.rest();
+  std::vector<std::array<std::uint32_t, 4>> tets;
+  for (std::size_t e = 0; e < quadratic.element_count(); ++e) {
+    const auto node = quadratic.nodes(e);
+    for (const auto& part : kParts) {
+      std::array<std::uint32_t, 4> t{node[part[0]], node[part[1]], node[part[2]], node[part[3]]};
+      if (dot(x[t[1]] - x[t[0]], cross(x[t[2]] - x[t[0]], x[t[3]] - x[t[0]])) < 0) std::swap(t[2], t[3]);
+      tets.push_back(t);
     }
   }
-  if (materials.size() == 1) f.materials.assign(1, materials[0]);
-  return f;
+  return tets;
 }
 
 }  // namespace
@@ -152,39 +152,30 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   const Elements elements = elements_for(p.law, p.order, problem, mesh);
   const auto body = [&](TetOrder order) { return FemBody(points, tets, problem.materials, elements.law, order); };
   const FemBody true_body = body(elements.order), other_body = body(elements.order == TetOrder::t4 ? TetOrder::t10 : TetOrder::t4);
-  const auto solve = [&](const FemBody& of, const TissueLoad& load) {
-    const TissueLoad all = of.on_all_points(load);
-    EquilibriumSolver solver(of, of.rest(), all);
-    Equilibrium r = solver.solve(of, of.rest(), all.forces_n, {1e-10, 100, 1}, context);
-    if (!r.converged) r = solver.solve(of, of.rest(), all.forces_n, {1e-10, 100, 8}, context);
-    if (!r.converged) throw not_at_rest(r, "make the load smaller");
-    return r.points_mm;
-  };
+  Statics true_statics(true_body, true_body.on_all_points(problem.loads.front())),
+      other_statics(other_body, other_body.on_all_points(problem.loads.front()));
   // The truth, and how far it may be off itself: the other order on the same mesh.
   std::vector<std::vector<Vec3>> truth;
   std::vector<double> doubt;
   for (std::size_t n = 0; n < problem.loads.size(); ++n) {
     context.progress(0.5 * static_cast<double>(n) / static_cast<double>(problem.loads.size()), "finite elements");
-    truth.push_back(solve(true_body, problem.loads[n]));
-    doubt.push_back(calibration_error(points, solve(other_body, problem.loads[n]), truth.back()).nrms);
+    truth.push_back(true_statics.solve(problem.loads[n], context));
+    doubt.push_back(calibration_error(points, other_statics.solve(problem.loads[n], context), truth.back()).nrms);
   }
   std::vector<double> doubt_finer;
   if (p.check_truth) {
-    const Finer fine = finer(points, tets, problem.materials);
-    const FemBody fine_body(fine.points, fine.tets, fine.materials, elements.law, elements.order);
-    // Held where both ends of an edge were held, forces in the middle of edges there: as quadratic tetrahedra take them.
-    const FemBody coarse = body(TetOrder::t10);
-    std::vector<std::uint32_t> place(coarse.point_count());
-    std::map<std::array<double, 3>, std::uint32_t> at;
-    for (std::uint32_t q = 0; q < fine.points.size(); ++q) at[{fine.points[q].x, fine.points[q].y, fine.points[q].z}] = q;
-    for (std::uint32_t q = 0; q < place.size(); ++q) place[q] = at.at({coarse.rest()[q].x, coarse.rest()[q].y, coarse.rest()[q].z});
+    // Held and loaded as quadratic elements are: in the middle of an edge, too.
+    const FemBody quadratic = body(TetOrder::t10);
+    std::vector<Material> materials = problem.materials;
+    if (materials.size() > 1) {
+      materials.clear();
+      for (const Material& m : problem.materials) materials.insert(materials.end(), 8, m);
+    }
+    const FemBody fine(quadratic.rest(), eight_of_each(quadratic), std::move(materials), elements.law, elements.order);
+    Statics statics(fine, fine.on_all_points(quadratic.on_all_points(problem.loads.front())));
     for (std::size_t n = 0; n < problem.loads.size(); ++n) {
       context.progress(0.5, "finite elements half as large");
-      TissueLoad load = coarse.on_all_points(problem.loads[n]);
-      for (auto& [q, f] : load.forces_n) q = place[q];
-      for (std::uint32_t& q : load.fixed) q = place[q];
-      for (Slider& q : load.sliders) q.point = place[q.point];
-      const auto x = solve(fine_body, load);
+      const auto x = statics.solve(quadratic.on_all_points(problem.loads[n]), context);
       doubt_finer.push_back(calibration_error(points, {truth[n].data(), points.size()}, {x.data(), points.size()}).nrms);
     }
   }

@@ -194,9 +194,7 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
   for (auto* const v : {&m.x, &m.y, &m.z, &m.px, &m.py, &m.pz, &m.fx, &m.fy, &m.fz, &m.lx, &m.ly, &m.lz}) v->assign(n, 0);
   for (std::uint32_t p = 0; p < n; ++p) set_position(p, model.rest()[p]);
   m.lay_out();
-  m.surface = points_of_boundary(model);
-  m.surface_point.assign(n, false);
-  for (const std::uint32_t p : m.surface) m.surface_point[p] = true;
+  m.lay_surface();
   for (const auto& t : model.tets()) m.margin = std::max(m.margin, 0.25 * length(model.rest()[t[1]] - model.rest()[t[0]]));
   m.dt = m.certify();
   m.inverse_mass.assign(n, 0);
@@ -211,11 +209,10 @@ TissueDynamics<Real>::~TissueDynamics() = default;
 template <class Real>
 void TissueDynamics<Real>::set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces) {
   Impl& m = *impl_;
+  require_load(forces, m.x.size());
   for (auto* const v : {&m.lx, &m.ly, &m.lz}) std::fill(v->begin(), v->end(), Real(0));
   m.load_size = 0;
   for (const auto& [p, f] : forces) {
-    if (p >= m.x.size() || !std::isfinite(dot(f, f)))
-      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
     m.lx[p] += static_cast<Real>(f.x);
     m.ly[p] += static_cast<Real>(f.y);
     m.lz[p] += static_cast<Real>(f.z);
@@ -239,18 +236,10 @@ void TissueDynamics<Real>::cut_off(std::span<const std::uint32_t> tets) {
   if (!m.cutter) m.cutter = std::make_unique<Cutter>(m.model);
   m.cutter->cut(m.model, tets);
   m.lay_out();  // what is gone only lowers the frequencies: the step stays
-  for (const std::uint32_t t : tets) {
-    if (t >= m.model.tets().size()) continue;
-    for (const std::uint32_t p : m.model.tets()[t]) {
-      if (m.surface_point[p]) continue;
-      m.surface_point[p] = true;
-      m.surface.push_back(p);
-    }
-  }
+  m.lay_surface();
   for (std::uint32_t p = 0; p < m.x.size(); ++p) {
     if (m.cutter->tets_of_point(p) == 0) m.inverse_mass[p] = 0;
   }
-  if (!m.triangles.empty()) m.lay_triangles();
   m.tool_steps = 0;
 }
 
@@ -259,10 +248,7 @@ std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
   const Impl& m = *impl_;
   std::vector<std::uint32_t> parent(m.x.size());
   std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  const auto root = [&](std::uint32_t i) { return root_of(parent, i); };
   const auto there = [&](std::uint32_t t) { return !m.cutter || m.cutter->there(t); };
   for (std::uint32_t t = 0; t < m.model.tets().size(); ++t) {
     if (!there(t)) continue;

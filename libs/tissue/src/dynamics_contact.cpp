@@ -3,7 +3,6 @@
 
 #include "body_parts.h"
 #include "dynamics_impl.h"
-#include "osteo/data/tet_mesh.h"
 #include "osteo/distance/triangle_tree.h"
 
 namespace osteo {
@@ -15,7 +14,6 @@ void TissueDynamics<Real>::set_tool(RigidContact tool) {
   impl_->tool = std::move(tool);
   impl_->tool_steps = 0;
   impl_->tool_balls = impl_->tool.shape ? impl_->tool.shape->balls() : std::vector<RigidShape::Ball>{};
-  if (impl_->tool.shape && impl_->triangles.empty()) impl_->lay_triangles();
 }
 
 template <class Real>
@@ -31,28 +29,21 @@ void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
   for (const std::uint32_t p : m.ties) m.tied[p] = true;
 }
 
+// What of a contact's stiffness the step has room for.
 template <class Real>
-void TissueDynamics<Real>::Impl::push(std::uint32_t p, double deep, Vec3 out) {
-  const double most = room(p);
-  if (obstacle.stiffness_n_per_mm > most) ++counts.softened;
-  add(p, out * (std::min(obstacle.stiffness_n_per_mm, most) * deep));
+double TissueDynamics<Real>::Impl::stiffness(const RigidContact& by, double most) {
+  if (by.stiffness_n_per_mm > most) ++counts.softened;
+  return std::min(by.stiffness_n_per_mm, most);
 }
 
 template <class Real>
-void TissueDynamics<Real>::Impl::lay_triangles() {
-  TetMesh mesh;
-  for (const Vec3& p : model.rest()) mesh.points_mm.push_back(to_floats(p));
-  for (std::uint32_t t = 0; t < model.tets().size(); ++t) {
-    if (!cutter || cutter->there(t)) mesh.tets.push_back(model.tets()[t]);
-  }
-  std::vector<std::uint32_t> point_of;
-  const TriMesh boundary = boundary_of(mesh, &point_of);
-  triangles.clear();
+void TissueDynamics<Real>::Impl::lay_surface() {
+  triangles = boundary_triangles(model, cutter.get());
   triangles_of.assign(x.size(), 0);
-  for (const auto& t : boundary.triangles) {
-    triangles.push_back({point_of[t[0]], point_of[t[1]], point_of[t[2]]});
-    for (const std::uint32_t p : triangles.back()) ++triangles_of[p];
+  for (const auto& t : triangles) {
+    for (const std::uint32_t p : t) ++triangles_of[p];
   }
+  surface = points_of(triangles);
 }
 
 template <class Real>
@@ -79,16 +70,12 @@ Vec3 TissueDynamics<Real>::Impl::push_by_tool() {
   Vec3 on_tool{};
   // Each triangle of a point may push all of it.
   const auto share = [&](std::uint32_t p) { return room(p) / std::max<double>(1, triangles_of[p]); };
-  const auto stiffness = [&](double most) {
-    if (tool.stiffness_n_per_mm > most) ++counts.softened;
-    return std::min(tool.stiffness_n_per_mm, most);
-  };
   for (const std::uint32_t p : near_points) {
     Vec3 out;
     const double d = tool.shape->distance_mm(at(p), out);
-    if (!(d < 0) || (surface_point[p] && !tool_balls.empty())) continue;
+    if (!(d < 0) || (triangles_of[p] > 0 && !tool_balls.empty())) continue;
     ++met;
-    const Vec3 f = out * (stiffness(share(p)) * -d);
+    const Vec3 f = out * (stiffness(tool, share(p)) * -d);
     add(p, f);
     on_tool -= f;
   }
@@ -116,7 +103,7 @@ Vec3 TissueDynamics<Real>::Impl::push_by_tool() {
     const Vec3 w = where - a;
     const double b1 = dot(cross(w, v), area) / square, b2 = dot(cross(u, w), area) / square;
     const double b[3] = {1 - b1 - b2, b1, b2};
-    const double k = stiffness(std::min({share(q[0]), share(q[1]), share(q[2])}));
+    const double k = stiffness(tool, std::min({share(q[0]), share(q[1]), share(q[2])}));
     double slows = 0;
     for (std::size_t n = 0; n < 3; ++n) slows += b[n] * slowed(q[n], k, out);
     const Vec3 f = out * (k * std::max(0.0, deep - slows));
@@ -153,11 +140,11 @@ void TissueDynamics<Real>::Impl::push_by_obstacle() {
     // Not all of a great depth at once, and with half of critical damping: who comes out of bone is not thrown.
     const double deep = std::min(q.offset - dot(q.normal, at(q.point)), margin);
     if (!(deep > 0)) continue;
-    const double k = std::min(obstacle.stiffness_n_per_mm, room(q.point));
-    push(q.point, std::max(0.0, deep - slowed(q.point, k, q.normal)), q.normal);
+    const double k = stiffness(obstacle, room(q.point));
+    add(q.point, q.normal * (k * std::max(0.0, deep - slowed(q.point, k, q.normal))));
   }
   for (const std::uint32_t p : ties) {
-    if (inverse_mass[p] != 0) push(p, 1, model.rest()[p] - at(p));
+    if (inverse_mass[p] != 0) add(p, (model.rest()[p] - at(p)) * stiffness(obstacle, room(p)));
   }
 }
 

@@ -26,7 +26,6 @@ struct TissueDynamics<Real>::Impl {
   // Contact (dynamics_contact.cpp).
   RigidContact tool, obstacle;
   std::vector<std::uint32_t> surface;  // points of the body's boundary
-  std::vector<bool> surface_point;     // of all points
   std::vector<bool> tied;              // of all points: to its place in the obstacle
   std::vector<std::uint32_t> ties;     // those
   struct Plane {
@@ -38,7 +37,7 @@ struct TissueDynamics<Real>::Impl {
   // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
   // too.
   std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
-  std::vector<std::uint32_t> triangles_of;                 // of each point: how many
+  std::vector<std::uint32_t> triangles_of;                 // of each point: how many; 0 inside the body
   std::vector<std::uint32_t> near_triangles, near_points;  // those that the tool may reach before it is looked for again
   std::vector<RigidShape::Ball> tool_balls;
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
@@ -59,8 +58,7 @@ struct TissueDynamics<Real>::Impl {
   [[nodiscard]] double room(std::uint32_t p) const {
     return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
   }
-  // The obstacle on a point: `deep` above 0, along `out`.
-  void push(std::uint32_t p, double deep, Vec3 out);
+  double stiffness(const RigidContact& by, double most);
   void add(std::uint32_t p, Vec3 f) {
     fx[p] += static_cast<Real>(f.x);
     fy[p] += static_cast<Real>(f.y);
@@ -73,7 +71,7 @@ struct TissueDynamics<Real>::Impl {
     return dot(out, at(p) - before) / dt * std::sqrt(mass[p] / k);
   }
   void find_planes();
-  void lay_triangles();
+  void lay_surface();
   void find_near();
   Vec3 push_by_tool();
   void push_by_obstacle();

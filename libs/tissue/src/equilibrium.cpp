@@ -10,6 +10,7 @@
 #include <memory>
 #include <numeric>
 
+#include "body_parts.h"
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
 
@@ -18,6 +19,9 @@ extern "C" void openblas_set_num_threads(int) __attribute__((weak));  // where B
 #endif
 
 namespace osteo {
+
+using namespace tissue;
+
 namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
@@ -67,11 +71,6 @@ class Factor {
 };
 
 constexpr std::uint32_t kFixed = 0xffffffffU;
-
-std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
 
 // Of the six rigid motions of a part, how many the given axes of points leave free: rank of the moved distances, lengths taken relative to
 // the part's size.
@@ -261,17 +260,17 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
       if (p >= points)
         throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
       used[p] = true;
-      const std::uint32_t a = root(parent, nodes[0]), b = root(parent, p);
+      const std::uint32_t a = root_of(parent, nodes[0]), b = root_of(parent, p);
       if (a != b) parent[std::max(a, b)] = std::min(a, b);
     }
     if (nodes.size() == 1) anchored[nodes[0]] = true;
   }
   std::vector<std::vector<std::pair<Vec3, std::uint8_t>>> holds(points);
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (used[p] && (held[p] != 0 || anchored[p])) holds[root(parent, p)].push_back({rest[p], anchored[p] ? kAllAxes : held[p]});
+    if (used[p] && (held[p] != 0 || anchored[p])) holds[root_of(parent, p)].push_back({rest[p], anchored[p] ? kAllAxes : held[p]});
   }
   for (std::uint32_t p = 0; p < points; ++p) {
-    if (!used[p] || root(parent, p) != p) continue;
+    if (!used[p] || root_of(parent, p) != p) continue;
     if (const int left = free_motions(holds[p]); left > 0) {
       throw Error(ExitCode::usage,
                   "the part of the body with point " + std::to_string(p) + " can move freely: of its six rigid motions " +
@@ -296,11 +295,8 @@ Equilibrium EquilibriumSolver::solve(const Energy& energy, std::span<const Vec3>
   result.points_mm.assign(start.begin(), start.end());
   std::vector<Vec3>& x = result.points_mm;
   std::vector<Vec3> load(x.size()), gradient(x.size()), trial(x.size());
-  for (const auto& [p, f] : forces) {
-    if (p >= x.size() || !std::isfinite(dot(f, f)))
-      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
-    load[p] += f;
-  }
+  require_load(forces, x.size());
+  for (const auto& [p, f] : forces) load[p] += f;
   const auto free = [&](std::uint32_t p) { return m.number[p] != kFixed; };
   double load_size = 0;
   for (std::uint32_t p = 0; p < x.size(); ++p) {

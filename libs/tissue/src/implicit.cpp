@@ -108,7 +108,7 @@ struct ImplicitDynamics::Impl {
         v(x.size()),
         load(x.size()),
         held(x.size()),
-        surface(points_of_boundary(m)) {
+        surface(points_of(boundary_triangles(m))) {
     for (const std::uint32_t p : fixed) held[p] = 7;
     for (const Slider& s : sliders) held[s.point] = static_cast<std::uint8_t>(held[s.point] | s.held);
     for (std::size_t p = 0; p < x.size(); ++p)
@@ -131,12 +131,9 @@ ImplicitDynamics::~ImplicitDynamics() = default;
 
 void ImplicitDynamics::set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces) {
   Impl& m = *impl_;
+  require_load(forces, m.x.size());
   std::fill(m.load.begin(), m.load.end(), Vec3{});
-  for (const auto& [p, f] : forces) {
-    if (p >= m.x.size() || !std::isfinite(dot(f, f)))
-      throw Error(ExitCode::usage, "a load on point " + std::to_string(p) + " is not finite, or there is no such point");
-    m.load[p] += f;
-  }
+  for (const auto& [p, f] : forces) m.load[p] += f;
   m.load_size = 0;
   for (const Vec3& f : m.load) m.load_size = std::max(m.load_size, length(f));
 }

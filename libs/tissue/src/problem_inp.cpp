@@ -1,7 +1,6 @@
 #include "problem_inp.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <map>
 
@@ -92,11 +91,8 @@ class Reader {
     return found->second;
   }
   [[nodiscard]] static double number_of(const InpCard& card, const std::string& field) {
-    double v = 0;
-    const char* const end = field.data() + field.size();
-    const auto [at, problem] = std::from_chars(field.data() + (field.starts_with('+') ? 1 : 0), end, v);
-    if (problem != std::errc() || at != end) throw fail(card, "'" + field + "' is no number");
-    return v;
+    if (const auto v = inp_number(field)) return *v;
+    throw fail(card, "'" + field + "' is no number");
   }
   [[nodiscard]] static double number(const InpCard& card, std::size_t row, std::size_t column) {
     if (card.rows.size() <= row || card.rows[row].size() <= column) throw fail(card, "it has too few numbers");

@@ -8,6 +8,7 @@
 
 #include "block.h"
 #include "osteo/base/error.h"
+#include "osteo/tissue/calibrate.h"
 #include "osteo/tissue/dynamics.h"
 
 namespace osteo {
@@ -35,12 +36,7 @@ std::vector<std::pair<std::uint32_t, Vec3>> top_of(const test::Block& b, double 
   return load;
 }
 double off(std::span<const Vec3> a, std::span<const Vec3> b, std::span<const Vec3> rest) {
-  double sum = 0, size = 0;
-  for (std::size_t p = 0; p < a.size(); ++p) {
-    sum += dot(a[p] - b[p], a[p] - b[p]);
-    size += dot(b[p] - rest[p], b[p] - rest[p]);
-  }
-  return std::sqrt(sum / size);
+  return calibration_error(rest, a, b).nrms;
 }
 
 // Backward Euler is of first order: half the step, half the distance to the motion that short explicit steps make.

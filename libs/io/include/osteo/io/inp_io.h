@@ -1,6 +1,7 @@
 // Input files of Abaqus and CalculiX (.inp), as far as bodies of tetrahedra need them.
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -30,6 +31,9 @@ struct InpFile {
   std::map<std::string, std::vector<long>> node_sets, element_sets;   ///< *NSET, *ELSET (GENERATE too), and those named at *NODE, *ELEMENT
   std::vector<InpCard> cards;                                         ///< all others, in their order
 };
+
+/// A field as a finite number; nothing when it is none.
+[[nodiscard]] std::optional<double> inp_number(std::string_view field);
 
 /// Errors: corrupt, with `name` and line: what is no number, elements of other kinds, nodes that are not there; *INCLUDE and parts
 /// with instances are refused.
