@@ -28,7 +28,7 @@ if(OSTEO_FUZZ)
   add_link_options(-fsanitize=address,undefined)
 endif()
 if(OSTEO_SANITIZE)
-  add_compile_options(-fsanitize=${OSTEO_SANITIZE} -fno-omit-frame-pointer)
+  add_compile_options(-fsanitize=${OSTEO_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${OSTEO_SANITIZE})
 endif()
 

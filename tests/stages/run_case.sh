@@ -4,6 +4,9 @@
 #   fails CODE 'text' command...   the command must exit with CODE and print the text on standard error
 #   same A B                       the files must be equal byte for byte
 #   value FILE key                 a top-level key of a JSON file
+#   soon command...                waits until the command succeeds, a minute at most
+#   holds FILE bytes               the file is at least that long
+#   hears_interrupt PID            the process has its handler for SIGINT (bit 2 of the signals that it catches)
 set -euo pipefail
 file=$1 name=$2 bin=$3 fixtures=$4 source=$5
 PATH=$bin:$PATH
@@ -22,5 +25,12 @@ fails() {
 }
 same() { cmp "$1" "$2"; }
 value() { python3 -c 'import json,sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"; }
-export -f fails same value; export fixtures PATH
+soon() {
+  for _ in $(seq 600); do "$@" 2>/dev/null && return; sleep 0.1; done
+  echo "never came: $*"
+  return 1
+}
+holds() { [ "$(stat -c %s "$1" 2>/dev/null || echo 0)" -ge "$2" ]; }
+hears_interrupt() { grep -qE '^SigCgt:.*[2367abef]$' "/proc/$1/status"; }
+export -f fails same value soon holds hears_interrupt; export fixtures PATH
 eval "${line#*|}"

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <thread>
@@ -57,7 +58,6 @@ class Watcher {
     }
     return decode_pedal(model_, report, pressed) ? text + "pedals " + std::to_string(pressed) : text + unknown(report);
   }
-  std::vector<std::string> lines;
 
  private:
   static std::string unknown(std::span<const std::byte> report) { return "not understood, " + std::to_string(report.size()) + " bytes"; }
@@ -122,26 +122,34 @@ int DevicesCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) io.out << j.dump(2) << '\n';
   if (found.empty() && !io.common.json) io.out << "none of the devices known here is plugged in, or this process may not see it\n";
   if (p.watch > 0) {
-    std::vector<std::unique_ptr<Watcher>> watchers;
+    std::mutex mutex;  // a line at a time
     std::vector<std::thread> threads;
+    bool all_heard = true;
     for (const FoundDevice& f : found) {
       if (!f.readable) continue;
-      watchers.push_back(std::make_unique<Watcher>(f.model, std::string(name_of(f.model))));
-      threads.emplace_back([&, w = watchers.back().get(), info = f.info] {
+      threads.emplace_back([&, f] {
+        Watcher w(f.model, std::string(name_of(f.model)));
+        const auto say = [&](const std::string& line) {
+          const std::lock_guard lock(mutex);
+          io.out << line << std::endl;
+        };
         std::string why;
-        const auto port = open_hid(info, why);
+        const auto port = open_hid(f.info, why);
         std::array<std::byte, 512> buffer;
         const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(p.watch);
-        while (port != nullptr && std::chrono::steady_clock::now() < end) {
-          const int n = port->read(buffer, 50);
-          if (n < 0) break;
-          if (n > 0) w->lines.push_back(w->decode({buffer.data(), static_cast<std::size_t>(n)}));
+        int n = port == nullptr ? -1 : 0;
+        while (n >= 0 && !io.context.cancelled() && std::chrono::steady_clock::now() < end) {
+          n = port->read(buffer, 50);
+          if (n > 0) say(w.decode({buffer.data(), static_cast<std::size_t>(n)}));
         }
+        if (n >= 0) return;
+        say(std::string(name_of(f.model)) + ": " + (port == nullptr ? "cannot be opened: " + why : "unplugged"));
+        const std::lock_guard lock(mutex);
+        all_heard = false;
       });
     }
     for (auto& t : threads) t.join();
-    for (const auto& w : watchers)
-      for (const auto& line : w->lines) io.out << line << '\n';
+    if (!all_heard) return static_cast<int>(ExitCode::cannot_read);
   }
   return 0;
 }

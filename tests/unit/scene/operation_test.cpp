@@ -10,6 +10,7 @@
 #include "osteo/bone/plates.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/session/session_file.h"
+#include "scratch.h"
 
 namespace osteo {
 namespace {
@@ -23,12 +24,6 @@ Script strokes(double x, double seconds) {
     s.waypoints.push_back({t, {x + 2 * std::cos(9 * t), 2 * std::sin(9 * t), 5.4 - 0.5 * t}, true});
   s.waypoints.push_back({seconds, {x, 0, 9}, false});
   return s;
-}
-
-std::filesystem::path fresh(const std::string& name) {
-  const auto path = std::filesystem::temp_directory_path() / ("osteo_operation_" + name);
-  std::filesystem::remove_all(path);
-  return path;
 }
 
 std::vector<SceneAction> at_ticks(std::vector<std::pair<std::uint64_t, SceneAction>> list) {
@@ -77,7 +72,8 @@ RehearsalOptions options(const std::filesystem::path& file, ContactMethod method
 TEST(Operation, EverythingComesOutTheSameFromTheStream) {
   for (const ContactMethod method : {ContactMethod::overlap, ContactMethod::proxy, ContactMethod::volume, ContactMethod::rays}) {
     for (const bool by_the_clock : {false, true}) {
-      const auto file = fresh("all.oss");
+      const test::ScratchFolder scratch;
+      const auto file = scratch / "all.oss";
       World world(test::bar(0.5, 0.3));
       const World start = world.copy();
       Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000), options(file, method), {});
@@ -109,7 +105,8 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
 }
 
 TEST(Operation, NothingIsRemovedWhileTheSceneIsPrepared) {
-  const auto file = fresh("hold.oss");
+  const test::ScratchFolder scratch;
+  const auto file = scratch / "hold.oss";
   World world(test::bar(0.25, 0));
   Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(strokes(4, 2), 1000), options(file, ContactMethod::overlap), {});
   r.start();

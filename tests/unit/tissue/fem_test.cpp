@@ -16,6 +16,7 @@
 #include "derivatives.h"
 #include "mapped.h"
 #include "osteo/base/error.h"
+#include "scratch.h"
 
 namespace osteo {
 namespace {
@@ -310,9 +311,9 @@ TEST(Fem, LamesTube) {
 }
 
 // Displacements that CalculiX finds for the same file.
-std::vector<Vec3> calculix(const std::string& inp, std::size_t points, const std::string& name) {
-  const auto folder = std::filesystem::temp_directory_path() / ("osteo_ccx_" + name);
-  std::filesystem::create_directories(folder);
+std::vector<Vec3> calculix(const std::string& inp, std::size_t points) {
+  const test::ScratchFolder scratch;
+  const auto& folder = scratch.path();
   std::ofstream(folder / "job.inp") << inp;
   if (std::system(("cd " + folder.string() + " && OMP_NUM_THREADS=1 ccx job > ccx.log 2>&1").c_str()) != 0) return {};
   std::ifstream in(folder / "job.dat");
@@ -350,7 +351,7 @@ TEST(Fem, AgreesWithCalculix) {
     EquilibriumSolver solver(body, body.rest(), load);
     const Equilibrium r = solver.solve(body, body.rest(), load.forces_n);
     ASSERT_TRUE(r.converged) << r.why;
-    const auto u = calculix(inp_text(body, load), body.point_count(), c.name);
+    const auto u = calculix(inp_text(body, load), body.point_count());
     ASSERT_EQ(u.size(), body.point_count()) << "ccx failed on " << c.name;
     double off = 0, size = 0;
     for (std::size_t p = 0; p < u.size(); ++p) {
