@@ -1,4 +1,7 @@
 // demo: the main job from end to end.
+#include <unistd.h>
+
+#include <algorithm>
 #include <ostream>
 
 #include "commands.h"
@@ -6,6 +9,7 @@
 #include "osteo/base/files.h"
 #include "osteo/dicom/save_series.h"
 #include "osteo/image/phantom.h"
+#include "osteo/scene/case.h"
 
 namespace osteo {
 
@@ -20,25 +24,46 @@ cli::CommandInfo DemoCommand::info() {
 
 int DemoCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path out = p.out;
-  fs::create_directories(out);
+  make_output_folder(out);
   const bool phantom = io.arguments.empty();
   fs::path source = phantom ? out / "phantom-dicom" : fs::path(io.arguments[0]);
   const auto say = [&](const std::string& text) {
     io.end_progress();
     if (!io.common.quiet) io.err << "\n== " << text << '\n';
   };
+  // Without a terminal there is no bar: a line for each new activity and each 20 % says what is going on.
+  if (::isatty(2) == 0 && !io.common.quiet && io.common.progress == cli::ProgressStyle::automatic) {
+    io.context.on_progress([&err = io.err, activity = std::string(), fifths = 0](double fraction, std::string_view what) mutable {
+      const int now = static_cast<int>(fraction * 5);
+      if (what.empty() || (what == activity && now <= fifths)) return;
+      if (what != activity) fifths = 0;
+      activity = what;
+      fifths = std::max(fifths, now);
+      err << "   " << static_cast<int>(fraction * 100) << " %  " << activity << std::endl;
+    });
+  }
   if (phantom && !fs::exists(source)) {
     say("making a CT of a phantom head: " + source.string());
     PhantomParams params;
     save_dicom_series(make_phantom(params, io.context).ct, source, io.context);
+    io.end_progress();
   }
   say("preparing the case: " + (out / "case").string());
   PrepareCommand::Params prepare;
   prepare.out = (out / "case").string();
   prepare.axes = p.axes;
   if (phantom) prepare.lower = 500;  // half-way between the phantom's bone and tissue
+  prepare.fresh = true;
+  io.given = {"lower", "axes", "fresh"};
+  if (!phantom) io.given.erase("lower");
+  io.settings.clear();
   io.arguments = {source.string()};
+  // Only what an earlier demo left on another scan is made anew.
+  const auto earlier = read_recipe(prepare.out);
+  const bool force = io.common.force;
+  io.common.force = force || (earlier && earlier->source_hash != hash_path(source));
   PrepareCommand::run(prepare, io);
+  io.common.force = force;
 
   say("drilling for " + format_number(p.seconds) + " s");
   const fs::path session = out / "session";
