@@ -1,4 +1,5 @@
-// Kills a recording program again and again in the middle of its writing, and looks for every record that it had been told was written.
+// Kills a recording program again and again in the middle of its writing, and looks for every record that it had been told was written; in
+// turns by the writer alone and by the recorder with its threads.
 // usage: kill_sessions KILLS FOLDER
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -10,8 +11,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <random>
+#include <thread>
 
 #include "osteo/base/error.h"
+#include "osteo/session/recorder.h"
 #include "osteo/session/session_file.h"
 
 namespace {
@@ -23,6 +26,31 @@ std::vector<osteo::TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
     t[i].removed_mm3 = static_cast<float>((first + i) % 1000);
   }
   return t;
+}
+
+[[noreturn]] void record_by_threads(const std::filesystem::path& path, std::atomic<std::uint64_t>* written) {
+  osteo::SessionHeader header;
+  header.program_version = "test";
+  osteo::StreamReader reader(1 << 12, 1 << 16);
+  osteo::Recorder recorder(reader, path, header);
+  recorder.start();
+  std::mt19937 random(static_cast<unsigned>(::getpid()));
+  for (std::uint64_t tick = 0;;) {
+    const std::size_t n = 1 + random() % 400;
+    for (osteo::TickRecord& t : some_ticks(tick, n)) {
+      t.voxels_changed = static_cast<std::uint32_t>(random() % 8);
+      std::vector<osteo::VoxelChange> changes(t.voxels_changed, {static_cast<osteo::VoxelKey>(random() % 100000), 0.5F});
+      while (reader.ticks.room() < 1 || !reader.changes.push(changes)) std::this_thread::yield();
+      reader.ticks.push(t);
+    }
+    // The system has them once they are taken and nothing waits.
+    tick += n;
+    for (osteo::Recorder::Status s; s.ticks < tick || s.waiting_bytes > 0;) {
+      s = recorder.status();
+      std::this_thread::yield();
+    }
+    written->store(tick, std::memory_order_release);
+  }
 }
 
 [[noreturn]] void record(const std::filesystem::path& path, std::atomic<std::uint64_t>* written) {
@@ -57,6 +85,7 @@ int main(int argc, char** argv) {
     std::filesystem::remove(path);
     written->store(0);
     const pid_t child = ::fork();
+    if (child == 0 && k % 2 == 1) record_by_threads(path, written);
     if (child == 0) record(path, written);
     ::usleep(1500 + static_cast<unsigned>(random()) % 15000);
     ::kill(child, SIGKILL);

@@ -137,7 +137,7 @@ struct WindowCommand {
       options.session_file = session.stream();
       rehearsal.reset();
       options.anatomy = anatomy_of(the_case, options.haptics, io.context);
-      World world = world_at_begin(session, the_case, options.anatomy);
+      World world = world_at_begin(session, the_case, options.anatomy, io.context);
       // In front of the bone on the patient's left, where the window looks.
       auto device = hands.make(in_front_of(world, tool), tool);
       options.haptics.device = device->traits();

@@ -83,7 +83,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   apply_haptic_settings(the_case.folder, p.settings, options.haptics);
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
-                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy);
+                                 : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy, io.context);
   const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds) : load_script(p.script);
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
@@ -114,19 +114,29 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     s = rehearsal.run_to_end(io.context);
   } else {
     rehearsal.start();
-    while (rehearsal.running()) {
+    // A script whose strokes nobody records is worth nothing: a full disk ends it at once.
+    bool lags = false;
+    while (rehearsal.running() && !rehearsal.recording().failure) {
       const double t = static_cast<double>(rehearsal.latest().tick) / p.rate_hz;
       try {
         io.context.progress(0.1 + 0.8 * std::min(1.0, t / script.seconds()), "drilling");
       } catch (const Error&) {
-        rehearsal.stop();  // what was drilled so far stays recorded
-        throw;
+        break;
       }
+      if (const std::string trouble = rehearsal.trouble(); !trouble.empty() && !std::exchange(lags, true)) io.context.warn(trouble);
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
+    const bool interrupted = rehearsal.running() && io.context.cancelled();
     s = rehearsal.stop();
+    s.interrupted = interrupted;
   }
   if (const std::string refused = rehearsal.take_refusal(); !refused.empty()) io.context.warn("an action could not be done: " + refused);
+  if (s.interrupted) {  // closed all the same; what takes time is left out
+    write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
+    io.end_progress();
+    if (!io.common.quiet) io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
+    io.context.check_cancelled();
+  }
   TriMesh after;
   draw("after.png");
   rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
@@ -137,6 +147,11 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (!io.common.quiet) {
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
+    if (s.ticks_not_recorded > 0)
+      io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
+             << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
+    if (s.ticks_not_followed > 0)
+      io.err << "structures were not watched in " << s.ticks_not_followed << " ticks, since the machine did not keep up\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
       io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999))
@@ -156,18 +171,19 @@ cli::CommandInfo ReplayCommand::info() {
           "run a session again and prove that it comes out the same",
           "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; "
           "also applies the recorded "
-          "voxel changes and compares that. Exit code 7 when anything differs.",
+          "voxel changes and compares that. Exit code 7 when anything differs, 8 when ticks were not recorded (what comes before is repeated, "
+          "the rest taken from the recorded changes), 4 when the file is damaged.",
           {{"session", "a session folder"}},
           "osteo replay SESSION"};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
-  const Session session = read_session(folder.stream());
+  const Session session = read_session(folder.stream(), Damage::keep);
   const Case the_case = load_case(folder.case_folder);
   HapticSetup setup = session.header.haptics;
   const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
-  const ReplayResult r = replay(session, world_at_begin(folder, the_case, anatomy), anatomy, io.context);
+  const ReplayResult r = replay(session, world_at_begin(folder, the_case, anatomy, io.context), anatomy, io.context);
   if (!p.surface_out.empty()) {
     if (fs::exists(p.surface_out) && !io.common.force)
       throw Error(ExitCode::cannot_write, "'" + p.surface_out + "' exists already", "--force replaces it");
@@ -179,41 +195,57 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
     save_grid(to_sparse(r.world->bodies().front().body->bone, "density"), p.bone_out);
   }
   io.end_progress();
-  ordered_json j{{"ticks", r.ticks},         {"actions", r.actions},         {"identical", r.identical},
-                 {"complete", r.complete},   {"bone_hash", r.bone_hash},     {"surface_hash", r.surface_hash},
-                 {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  ordered_json j{{"ticks", r.ticks},         {"ticks_repeated", r.ticks_repeated}, {"actions", r.actions},
+                 {"identical", r.identical}, {"complete", r.complete},             {"losses", r.losses},
+                 {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},     {"dust_hash", r.dust_hash},
+                 {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
+  // Losses are told even when quiet: they are no talk.
+  for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
+  const bool whole = session.gaps.empty();
+  if (!whole) {
+    io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "
+           << (session.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone") << '\n';
+  }
   if (!io.common.quiet) {
-    io.err << "replayed " << r.ticks << " ticks and " << r.actions << " actions in " << format_number(std::round(r.seconds * 100) / 100)
+    io.err << "replayed " << r.ticks_repeated << " ticks and " << r.actions << " actions in " << format_number(std::round(r.seconds * 100) / 100)
            << " s: " << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference)
            << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
   }
-  return r.identical ? 0 : static_cast<int>(ExitCode::failed);
+  if (session.damaged()) return static_cast<int>(ExitCode::corrupt);
+  if (!r.identical) return static_cast<int>(ExitCode::failed);
+  return whole ? 0 : static_cast<int>(ExitCode::partial);
 }
 
 cli::CommandInfo ExportCommand::info() {
   return {"export",
           "a session for other programs: CSV, HDF5 or MCAP",
-          "By the ending: .csv for spreadsheets, .h5 for MATLAB, Python and R (columns under /ticks), .mcap for Foxglove and ROS tools. "
-          "One row a "
-          "tick: pose, force, torque, removal, flags, how late the machine was.",
+          "By the ending: .csv for spreadsheets (actions in a second file, out-actions.csv), .h5 for MATLAB, Python and R (columns under "
+          "/ticks, /actions, /gaps), .mcap for Foxglove and ROS tools. One row a tick: pose, force, torque, removal, flags, how late the "
+          "machine was. Of a damaged session all that is whole is written, and the exit code is 4.",
           {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
           "osteo export SESSION ticks.csv"};
 }
 
 int ExportCommand::run(const Params&, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0]);
-  const Session session = read_session(folder.stream());
+  const Session session = read_session(folder.stream(), Damage::keep);
   const fs::path out = io.arguments[1];
-  if (fs::exists(out) && !io.common.force)
-    throw Error(ExitCode::cannot_write, "'" + out.string() + "' exists already", "--force replaces it");
+  for (const fs::path& file : export_files(out)) {
+    if (fs::exists(file) && !io.common.force)
+      throw Error(ExitCode::cannot_write, "'" + file.string() + "' exists already", "--force replaces it");
+  }
   export_session(session, out, io.context);
   io.end_progress();
-  if (!io.common.quiet)
-    io.err << session.ticks.size() << " ticks written to " << out.string() << (session.end ? "" : " (the session was cut short)") << '\n';
-  return 0;
+  for (const std::string& line : losses(session)) io.err << "session: " << line << '\n';
+  if (!io.common.quiet) {
+    io.err << session.ticks.size() << " ticks and " << session.actions.size() << " actions written to";
+    for (const fs::path& file : export_files(out)) io.err << ' ' << file.string();
+    io.err << (session.end ? "" : " (the session was cut short)") << '\n';
+  }
+  return session.damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
 }
 
 cli::CommandInfo PlanCommand::info() {
@@ -229,7 +261,7 @@ cli::CommandInfo PlanCommand::info() {
 int PlanCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder session = open_session_folder(io.arguments[0], p.case_folder);
   const Case the_case = load_case(session.case_folder);
-  const World world = world_at_end(session, the_case, {});
+  const World world = world_at_end(session, the_case, {}, io.context);
   const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
   const std::string text = write_plan(world, folder, io.context);
   Follower follower(world, {true, false, false}, 1000, io.context);

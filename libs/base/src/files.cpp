@@ -72,7 +72,8 @@ void sync_path(const fs::path& path, const fs::path& shown, int (*sync)(int) = :
 void require_space_left(const fs::path& path) {
   std::error_code ec;
   const auto space = fs::space(path.has_parent_path() ? path.parent_path() : fs::path("."), ec);
-  if (!ec && space.free == 0) throw_write_error(path, ENOSPC);
+  // Some file systems in user space tell of no blocks at all: that is no full disk.
+  if (!ec && space.capacity > 0 && space.free == 0) throw_write_error(path, ENOSPC);
 }
 
 void prepare_parent(const fs::path& path) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <chrono>
+#include <exception>
 
 namespace osteo {
 
@@ -22,35 +23,49 @@ void HidLink::run() {
   sched_param priority{};
   priority.sched_priority = 70;
   ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority);
-  std::array<std::byte, 512> buffer{}, newer{};
   while (!stop_) {
-    std::string why;
-    const auto port = open_(why);
-    if (port == nullptr) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      continue;
+    try {
+      read_on();
+    } catch (const std::exception& e) {
+      const std::lock_guard lock(trouble_mutex_);
+      trouble_ = e.what();
+    } catch (...) {
+      const std::lock_guard lock(trouble_mutex_);
+      trouble_ = "unknown trouble with the device";
     }
-    connected_ = true;
-    handler_.opened(*port);
-    while (!stop_) {
-      int n = port->read(buffer, timeout_ms_);
-      if (n < 0) break;
-      if (n > 0 && handler_.newest_only()) {
-        for (int m = port->read(newer, 0); m > 0; m = port->read(newer, 0)) {
-          buffer = newer;
-          n = m;
-          ++reports_;
-        }
-      }
-      if (n > 0) {
-        ++reports_;
-        handler_.report(*port, std::span(buffer.data(), static_cast<std::size_t>(n)));
-      }
-      handler_.idle(*port);
-    }
-    connected_ = false;
-    handler_.gone();
+    if (connected_.exchange(false)) handler_.gone();
     if (!stop_) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+std::string HidLink::trouble() const {
+  const std::lock_guard lock(trouble_mutex_);
+  return trouble_;
+}
+
+// Until it is gone, or was not there.
+void HidLink::read_on() {
+  std::array<std::byte, 512> buffer{}, newer{};
+  std::string why;
+  const auto port = open_(why);
+  if (port == nullptr) return;
+  connected_ = true;
+  handler_.opened(*port);
+  while (!stop_) {
+    int n = port->read(buffer, timeout_ms_);
+    if (n < 0) return;
+    if (n > 0 && handler_.newest_only()) {
+      for (int m = port->read(newer, 0); m > 0; m = port->read(newer, 0)) {
+        buffer = newer;
+        n = m;
+        ++reports_;
+      }
+    }
+    if (n > 0) {
+      ++reports_;
+      handler_.report(*port, std::span(buffer.data(), static_cast<std::size_t>(n)));
+    }
+    handler_.idle(*port);
   }
 }
 

@@ -36,6 +36,7 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
   device_.feel(force_n_, renderer_.contact().normal, renderer_.stiffness_n_per_mm());
   record.lateness_us = static_cast<float>(lateness_ns) / 1000;
   record.work_us = static_cast<float>(monotonic_ns() - begin) / 1000;
+  removed_mm3_.store(removed_mm3() + static_cast<double>(record.removed_mm3), std::memory_order_relaxed);
   stream_.publish(record, changes);
   ticks_.store(tick + 1, std::memory_order_relaxed);
   return true;

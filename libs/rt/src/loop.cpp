@@ -4,12 +4,16 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/prctl.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <string>
 
 namespace osteo {
 
@@ -33,6 +37,18 @@ std::int64_t thread_cpu_ns() noexcept {
   for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
 }
 
+// Under a limit MCL_FUTURE makes every later allocation beyond it fail, in all threads; CAP_IPC_LOCK is above the limit.
+bool may_lock_all() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY) return true;
+  constexpr unsigned kIpcLock = 14;
+  std::ifstream status("/proc/thread-self/status");
+  for (std::string word; status >> word;) {
+    if (word == "CapEff:" && status >> word) return (std::strtoull(word.c_str(), nullptr, 16) >> kIpcLock & 1) != 0;
+  }
+  return false;
+}
+
 }  // namespace
 
 FixedRateLoop::FixedRateLoop(double rate_hz, std::function<bool(std::int64_t)> tick) : rate_hz_(rate_hz), tick_(std::move(tick)) {}
@@ -52,6 +68,15 @@ void FixedRateLoop::join() {
 }
 
 void FixedRateLoop::run() {
+  try {
+    tick_on();
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+  running_ = false;
+}
+
+void FixedRateLoop::tick_on() {
   ::pthread_setname_np(::pthread_self(), "osteo-servo");
   sched_param priority{};
   priority.sched_priority = 80;
@@ -62,12 +87,21 @@ void FixedRateLoop::run() {
     ::prctl(PR_SET_TIMERSLACK, 1);
   }
   realtime_ = stats_.realtime_granted;
-  stats_.memory_locked = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  stats_.memory_locked = ::mlockall(may_lock_all() ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
   touch_stack();
   // As long as this file is open with a 0 in it, cores do not fall into sleep that takes long to wake from.
+  struct Undo {
+    int latency_fd;
+    bool locked;
+    ~Undo() {
+      if (latency_fd >= 0) ::close(latency_fd);
+      if (locked) ::munlockall();
+    }
+  };
   const int latency_fd = ::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
   const std::int32_t none = 0;
   stats_.idle_states_off = latency_fd >= 0 && ::write(latency_fd, &none, sizeof none) == sizeof none;
+  const Undo undo{latency_fd, stats_.memory_locked};
 
   const auto period = static_cast<std::int64_t>(1e9 / rate_hz_);
   std::int64_t due = monotonic_ns() + period;
@@ -90,9 +124,6 @@ void FixedRateLoop::run() {
       due += static_cast<std::int64_t>(lost) * period;
     }
   }
-  if (latency_fd >= 0) ::close(latency_fd);
-  if (stats_.memory_locked) ::munlockall();
-  running_ = false;
 }
 
 }  // namespace osteo

@@ -72,7 +72,15 @@ void Follower::lose(const Dusty& from, VoxelKey own, float density) {
 void Follower::happen(const SceneAction& action) {
   if (action.is(ActionKind::suction)) sucker_ = action;
   if (action.is(ActionKind::irrigate)) water_ = action;
-  if (action.is(ActionKind::hold) || action.is(ActionKind::resume) || awaited_.empty()) return;
+  if (action.is(ActionKind::hold) || action.is(ActionKind::resume)) return;
+  if (happened_before_ > 0) {
+    --happened_before_;
+  } else if (!awaited_.empty()) {
+    happen_next();
+  }
+}
+
+void Follower::happen_next() {
   Awaited a = std::move(awaited_.front());
   awaited_.pop_front();
   for (auto& [id, made] : a.made) dusty_.emplace(id, std::move(made));
@@ -96,8 +104,7 @@ void Follower::happen(const SceneAction& action) {
   for (const auto& [id, pose] : a.poses) dusty_.at(id).world_from_body = pose;
 }
 
-void Follower::dust_tick(const TickRecord& tick, std::span<const VoxelChange> changes) {
-  for (; !actions_.empty() && actions_.front().tick <= tick.tick; actions_.pop_front()) happen(actions_.front());
+void Follower::make_dust(std::span<const VoxelChange> changes) {
   const Dusty& first = dusty_.begin()->second;
   for (const VoxelChange& c : changes) {
     Dusty* const d = dusty_owner(c.voxel);
@@ -113,6 +120,11 @@ void Follower::dust_tick(const TickRecord& tick, std::span<const VoxelChange> ch
       dust_->add_at(place_of(*d, own), mm3);
     }
   }
+}
+
+void Follower::dust_tick(const TickRecord& tick, std::span<const VoxelChange> changes) {
+  for (; !actions_.empty() && actions_.front().tick <= tick.tick; actions_.pop_front()) happen(actions_.front());
+  make_dust(changes);
   // A hundred steps a second: 50 mm/s at half-millimetre voxels.
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz_ / 100)));
   if (tick.tick % every != 0) return;
@@ -126,14 +138,63 @@ void Follower::dust_tick(const TickRecord& tick, std::span<const VoxelChange> ch
   dust_->step();
 }
 
+// Ticks are missing: what follows from the bone alone is made again, and what is gone since has become dust.
+void Follower::catch_up() {
+  for (const auto& [id, f] : bodies_) {
+    for (std::uint32_t b = 0; b < f->body->bone.brick_count(); ++b) {
+      if (f->surface) f->surface->mark_brick(b);
+      if (f->components) f->components->mark_brick(b);
+    }
+  }
+  if (!dust_) return;
+  for (; !awaited_.empty(); ++happened_before_) happen_next();
+  std::vector<VoxelChange> changes;
+  for (const auto& [id, d] : dusty_) {
+    const auto live = bodies_.find(id);
+    if (live == bodies_.end()) continue;
+    const BrickGrid& bone = live->second->body->bone;
+    for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
+      if (bone.value(v) == d.bone.value(v)) continue;
+      // What the coarse grid holds of a finer region is counted there.
+      const Vec3 at = bone.frame().world_from_index({double(bone.coordinate(v).i), double(bone.coordinate(v).j), double(bone.coordinate(v).k)});
+      const bool of_region = !d.of_region && std::any_of(dusty_.begin(), dusty_.end(), [&](const auto& other) {
+        const Vec3 x = other.second.bone.frame().index_from_world(at);
+        return other.second.of_region && other.second.bone.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
+                                                                static_cast<int>(std::lround(x.z))) != BrickGrid::kNone;
+      });
+      if (!of_region) changes.push_back({v + d.first_brick * BrickGrid::kVoxels, bone.value(v)});
+    }
+  }
+  make_dust(changes);
+}
+
+void Follower::end(std::uint64_t ticks) {
+  if (ticks <= next_tick_) return;
+  ticks_lost_ += ticks - next_tick_;
+  next_tick_ = ticks;
+  catch_up();
+  update();
+}
+
+void Follower::update() {
+  for (const auto& [id, f] : bodies_) {
+    if (f->surface) {
+      for (const std::uint32_t b : f->surface->update()) f->changed_bricks.insert(b);
+    }
+    if (f->components) f->components->update();
+  }
+}
+
 std::size_t Follower::drain(StreamReader& reader) {
   std::size_t total = 0;
+  const std::uint64_t lost_before = ticks_lost_;
   while (const std::size_t n = reader.ticks.pop(ticks_)) {
     std::size_t wanted = 0;
     for (std::size_t t = 0; t < n; ++t) {
       const TickRecord& r = ticks_[t];
       wanted += r.voxels_changed;
-      removed_mm3_ += static_cast<double>(r.removed_mm3);
+      ticks_lost_ += r.tick - next_tick_;
+      next_tick_ = r.tick + 1;
       if (r.structure == 0) continue;
       const auto clearance = static_cast<double>(r.clearance_mm);
       auto& e = structure_events_.try_emplace(r.structure, StructureEvents{clearance, 0, 0}).first->second;
@@ -163,12 +224,8 @@ std::size_t Follower::drain(StreamReader& reader) {
     total += n;
   }
   if (total == 0) return 0;
-  for (const auto& [id, f] : bodies_) {
-    if (f->surface) {
-      for (const std::uint32_t b : f->surface->update()) f->changed_bricks.insert(b);
-    }
-    if (f->components) f->components->update();
-  }
+  if (ticks_lost_ > lost_before) catch_up();
+  update();
   return total;
 }
 

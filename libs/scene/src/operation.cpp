@@ -50,21 +50,18 @@ World::Effect Operation::act(const SceneAction& action, const Done& done, const 
   return effect;
 }
 
-World::Effect Operation::act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
-                                  const Done& done, const World::ComponentsOf& components) {
+std::optional<World::Effect> Operation::act_live(const SceneAction& action, const std::function<bool()>& running,
+                                                 const std::function<void()>& held, const Done& done, const World::ComponentsOf& components) {
   const auto wait = [&] {
     while (!servo_.taken() && running()) std::this_thread::sleep_for(std::chrono::microseconds(100));
   };
-  World::Effect ended;
-  ended.done = false;
-  ended.message = "the session has ended";
   wait();
-  if (!servo_.taken()) return ended;
+  if (!servo_.taken()) return std::nullopt;
   const bool hold = takes_time(action);
   if (hold) {
     act(SceneAction::plain(ActionKind::hold));
     wait();
-    if (!servo_.taken()) return ended;
+    if (!servo_.taken()) return std::nullopt;
     held();
   }
   World::Effect effect = act(action, done, components);

@@ -1,7 +1,11 @@
 #include "osteo/scene/rehearsal.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <exception>
 
 #include "osteo/base/error.h"
 #include "osteo/pipeline/pipeline.h"
@@ -21,7 +25,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
     header.rate_hz = options_.rate_hz;
     header.haptics = options_.haptics;
     header.dust = options_.follow.dust;
-    recorder_ = std::make_unique<Recorder>(stream_.add_reader(), options_.session_file, header);
+    recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
   if (options_.follow.surface || options_.follow.pieces || options_.follow.dust || options_.soft) reader_ = &stream_.add_reader();
   follower_ = std::make_unique<Follower>(operation_.world(), options_.follow, options_.rate_hz, context);
@@ -46,20 +50,22 @@ std::size_t Rehearsal::drain() {
   const std::size_t total = follower_->drain(*reader_);
   if (total == 0) return 0;
   latest_.store(follower_->latest());
-  removed_mm3_ = follower_->removed_mm3();
   if (options_.follow.pieces) pieces_ = static_cast<int>(follower_->large_pieces().size());
   return total;
 }
 
-void Rehearsal::perform(const SceneAction& action, bool live) {
+// False: the servo had ended before.
+bool Rehearsal::perform(const SceneAction& action, bool live) {
   const World::ComponentsOf components = [&](std::uint32_t body) { return follower_->components(body); };
   const Operation::Done done = [&](const World::Effect& e) { follower_->follow(operation_.world(), e); };
   World::Effect effect;
   if (live) {
     // Nobody looks at the scene while it changes; the wait for the servo is of a tick or two.
     const std::lock_guard lock(mutex_);
-    effect = operation_.act_live(
+    auto live_effect = operation_.act_live(
         action, [&] { return running(); }, [&] { drain(); }, done, components);
+    if (!live_effect) return false;
+    effect = std::move(*live_effect);
   } else {
     drain();
     effect = operation_.act(action, done, components);
@@ -70,6 +76,7 @@ void Rehearsal::perform(const SceneAction& action, bool live) {
     const std::lock_guard lock(queue_mutex_);
     refused_ = std::string(name_of(static_cast<ActionKind>(action.kind))) + ": " + effect.message;
   }
+  return true;
 }
 
 // Soft tissue a hundredth of a second further, where the tool is now.
@@ -103,7 +110,26 @@ std::string Rehearsal::take_refusal() {
   return std::exchange(refused_, {});
 }
 
+std::string Rehearsal::trouble() const {
+  const Recorder::Status s = recording();
+  if (s.failure) return std::string("recording has ended: ") + s.failure->what();
+  if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
+  if (s.behind_s > 3) return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
+  return device_->trouble();
+}
+
+// What it throws is told by stop(); a scene that nobody follows is no use to a hand, so the servo ends too.
 void Rehearsal::follow() {
+  ::pthread_setname_np(::pthread_self(), "osteo-follower");
+  try {
+    follow_on();
+  } catch (...) {
+    failure_ = std::current_exception();
+    loop_->request_stop();
+  }
+}
+
+void Rehearsal::follow_on() {
   while (!stop_) {
     std::optional<SceneAction> action;
     {
@@ -111,7 +137,8 @@ void Rehearsal::follow() {
       drain();
       if (running()) action = move_soft();
     }
-    if (!action) {
+    // What is due stays where it is until the servo can take it up, or has ended: finish() does the rest.
+    if (!action && running()) {
       const std::lock_guard lock(queue_mutex_);
       if (!timed_.empty() && timed_.front().tick <= operation_.ticks()) {
         action = timed_.front();
@@ -121,8 +148,10 @@ void Rehearsal::follow() {
         queue_.pop_front();
       }
     }
-    if (action && running()) {
-      perform(*action, true);
+    if (action) {
+      if (perform(*action, true) || action->is(ActionKind::yield)) continue;
+      const std::lock_guard lock(queue_mutex_);
+      timed_.push_front(*action);
     } else {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -132,8 +161,8 @@ void Rehearsal::follow() {
 void Rehearsal::start() {
   loop_ = std::make_unique<FixedRateLoop>(options_.rate_hz, [this](std::int64_t lateness_ns) { return operation_.step(lateness_ns); });
   if (recorder_) recorder_->start();
-  thread_ = std::thread([this] { follow(); });
   loop_->start();
+  thread_ = std::thread([this] { follow(); });
 }
 
 RehearsalSummary Rehearsal::stop() {
@@ -147,6 +176,19 @@ RehearsalSummary Rehearsal::stop() {
 }
 
 RehearsalSummary Rehearsal::run_to_end(const Context& context) {
+  bool interrupted = false;
+  try {
+    interrupted = !run_on(context);
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+  RehearsalSummary s = finish();
+  s.interrupted = interrupted;
+  return s;
+}
+
+// False: asked to stop.
+bool Rehearsal::run_on(const Context& context) {
   for (;;) {
     if (!timed_.empty() && timed_.front().tick <= operation_.ticks() && device_->active(operation_.ticks())) {
       perform(timed_.front(), false);
@@ -156,43 +198,75 @@ RehearsalSummary Rehearsal::run_to_end(const Context& context) {
       drain();
       if (const auto yield = move_soft()) perform(*yield, false);
     }
-    if (!operation_.step(0)) break;
+    if (!operation_.step(0)) return true;
     if (operation_.ticks() % 64 != 0) continue;
-    context.check_cancelled();
+    if (context.cancelled()) return false;
     if (recorder_) recorder_->drain();
+    if (recording().failure) return true;
     drain();
   }
-  return finish();
 }
 
+// Closes the session whatever happened before.
 RehearsalSummary Rehearsal::finish() {
-  operation_.finish();
-  drain();
-  if (recorder_) recorder_->stop();
+  if (summary_) return *summary_;
+  if (loop_ && loop_->failure() && !failure_) failure_ = loop_->failure();
   RehearsalSummary s;
+  std::string dust_hash;
+  if (!failure_) {
+    try {
+      operation_.finish();
+      drain();
+      // Due before the last tick or asked for, but the servo had ended first.
+      const auto take_due = [&]() -> std::optional<SceneAction> {
+        const std::lock_guard lock(queue_mutex_);
+        auto& from = !timed_.empty() && timed_.front().tick < operation_.ticks() ? timed_ : queue_;
+        if (from.empty()) return std::nullopt;
+        const SceneAction action = from.front();
+        from.pop_front();
+        return action;
+      };
+      while (const auto action = take_due()) {
+        perform(*action, false);
+        operation_.finish();
+        drain();
+      }
+      if (reader_ != nullptr) follower_->end(operation_.ticks());
+      s.surface_hash = follower_->surface_hash();
+      s.pieces = follower_->large_pieces();
+      if (const Dust* const dust = follower_->dust()) {
+        s.dust = dust->totals();
+        if (follower_->ticks_lost() == 0) dust_hash = dust->hash();  // else the same dust, but later: a replay's lies elsewhere
+      }
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+  }
   s.ticks = operation_.ticks();
-  s.removed_mm3 = recorder_ ? recorder_->removed_mm3() : removed_mm3_.load();
+  s.removed_mm3 = operation_.removed_mm3();
   s.sawn_mm3 = follower_->sawn_mm3();
   s.tissue_mm3 = tissue_mm3_;
   s.bone_hash = operation_.world().hash();
-  s.surface_hash = follower_->surface_hash();
-  if (reader_ != nullptr) s.dropped = reader_->dropped;
+  s.ticks_not_followed = follower_->ticks_lost();
   s.voxel_mm3 = voxel_mm3_;
-  s.pieces = follower_->large_pieces();
   s.bodies = operation_.world().bodies().size();
   s.fixtures = operation_.world().fixtures();
-  std::string dust_hash;
-  if (const Dust* const dust = follower_->dust()) {
-    s.dust = dust->totals();
-    dust_hash = dust->hash();
-  }
-  if (recorder_) {
-    if (recorder_->failure()) throw Error(*recorder_->failure());
-    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash});
-    s.session_bytes = recorder_->bytes();
-  }
   s.structures = follower_->structure_events();
   if (loop_) s.loop = loop_->stats();
+  if (recorder_) {
+    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash}, [&](std::vector<VoxelChange>& all) {
+      for (const PlacedBody& b : operation_.world().bodies()) {
+        const BrickGrid& bone = b.body->bone;
+        for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) all.push_back({b.body->name_of(v), bone.value(v)});
+      }
+    });
+    s.session_bytes = recorder_->bytes();
+    s.gaps = recorder_->gaps();
+    s.ticks_not_recorded = recorder_->status().ticks_lost;
+    if (const auto failure = recorder_->status().failure; failure && !failure_) failure_ = std::make_exception_ptr(Error(*failure));
+  }
+  if (failure_) std::rethrow_exception(failure_);
+  summary_ = s;
   return s;
 }
 

@@ -1,5 +1,6 @@
 #include "osteo/scene/session_folder.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
@@ -67,23 +68,39 @@ World world_of(const Case& the_case, const Anatomy& anatomy) {
   return world;
 }
 
-World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy) {
+World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
   if (session.resumed_from.empty()) return world_of(the_case, anatomy);
-  return world_at_end(open_session_folder(session.resumed_from, session.case_folder), the_case, anatomy);
+  return world_at_end(open_session_folder(session.resumed_from, session.case_folder), the_case, anatomy, context);
 }
 
-World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy) {
-  World world = world_at_begin(session, the_case, anatomy);
+World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+  World world = world_at_begin(session, the_case, anatomy, context);
   const Session recorded = read_session(session.stream());
+  const std::string name = "the session '" + session.folder.string() + "'";
   if (world.hash() != recorded.header.bone_hash) {
-    throw Error(ExitCode::corrupt, "the session '" + session.folder.string() + "' was recorded on another bone than its case holds now",
+    throw Error(ExitCode::corrupt, name + " was recorded on another bone than its case holds now",
                 "give the case it was recorded on, unchanged");
   }
-  apply_recorded(recorded, world);
-  if (recorded.end && world.hash() != recorded.end->bone_hash) {
-    throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
+  for (const std::string& line : losses(recorded)) context.warn(name + ": " + line);
+  const auto lost = std::find_if(recorded.gaps.begin(), recorded.gaps.end(), [](const Gap& g) { return g.bone_lost; });
+  if (lost == recorded.gaps.end()) {
+    apply_recorded(recorded, world);
+    if (recorded.end && world.hash() != recorded.end->bone_hash) {
+      throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
+    }
+    return world;
   }
-  return world;
+  // All bone was written once more at the end, if the session came to one.
+  World before = world.copy();
+  try {
+    apply_recorded(recorded, world);
+    if (recorded.end && world.hash() == recorded.end->bone_hash) return world;
+  } catch (const Error&) {
+    // It changes voxels of pieces that came to be while nothing was recorded.
+  }
+  context.warn(name + ": what it did from tick " + std::to_string(lost->first_tick) + " on cannot be used; the bone is as it was before");
+  apply_recorded(recorded, before, &*lost);
+  return before;
 }
 
 void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, HapticSetup& setup) {
@@ -135,7 +152,15 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["bone_hash"] = s.bone_hash;
   j["surface_hash"] = s.surface_hash;
   j["session_bytes"] = s.session_bytes;
-  j["ticks_lost_by_readers"] = s.dropped;
+  // Of all readers; each by itself where there is something to tell.
+  j["ticks_lost_by_readers"] = s.ticks_not_recorded + s.ticks_not_followed;
+  if (s.ticks_not_recorded > 0) {
+    j["ticks_not_recorded"] = s.ticks_not_recorded;
+    for (const RecordingGap& g : s.gaps)
+      j["gaps"].push_back({{"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bone_changes_lost", g.bone_lost != 0}});
+  }
+  if (s.ticks_not_followed > 0) j["ticks_not_watched_near_structures"] = s.ticks_not_followed;
+  if (s.interrupted) j["interrupted"] = true;
   if (!s.pieces.empty()) {
     j["pieces"] = ordered_json::array();
     for (const auto& p : s.pieces) {

@@ -1,27 +1,65 @@
 #include "osteo/session/recorder.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <chrono>
+#include <new>
+
+#include "backlog.h"
 
 namespace osteo {
+namespace {
 
-Recorder::Recorder(StreamReader& reader, const std::filesystem::path& path, const SessionHeader& header)
-    : reader_(reader), writer_(path, header), ticks_buffer_(256), changes_buffer_(1 << 20) {}
+// Whether it matters which densities it finds: all others may as well find those of a little later.
+bool looks_at_bone(const SceneAction& a) {
+  constexpr ActionKind kOthers[] = {ActionKind::hold,    ActionKind::resume,   ActionKind::move, ActionKind::grip,
+                                    ActionKind::suction, ActionKind::irrigate, ActionKind::yield};
+  return std::none_of(std::begin(kOthers), std::end(kOthers), [&](ActionKind k) { return a.is(k); });
+}
+
+}  // namespace
+
+Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header, std::size_t most_waiting_bytes)
+    : reader_(reader),
+      backlog_(new Backlog(std::move(sink))),
+      writer_(std::unique_ptr<SessionSink>(backlog_), header),
+      most_waiting_(most_waiting_bytes),
+      ticks_buffer_(256),
+      changes_buffer_(1 << 20) {}
 
 Recorder::~Recorder() {
   stop();
 }
 
+// Whatever goes wrong ends the recording, not the rehearsal.
+template <class F>
+void Recorder::guarded(F&& f) {
+  if (failed()) return;
+  try {
+    f();
+  } catch (const Error& e) {
+    fail(e);
+  } catch (const std::bad_alloc&) {
+    fail(Error(ExitCode::resources, "out of memory while recording", "what was recorded before can be replayed"));
+  } catch (const std::exception& e) {
+    fail(Error(ExitCode::unspecified, std::string("the recording has ended: ") + e.what()));
+  }
+}
+
+void Recorder::fail(const Error& error) {
+  const std::lock_guard lock(failure_mutex_);
+  if (!failure_) failure_ = error;
+  failed_ = true;
+}
+
 void Recorder::start() {
+  backlog_->start();
   thread_ = std::thread([this] {
-    auto synced = std::chrono::steady_clock::now();
+    ::pthread_setname_np(::pthread_self(), "osteo-recorder");
     while (!stop_) {
       drain();
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      if (const auto now = std::chrono::steady_clock::now(); now - synced > std::chrono::seconds(1)) {
-        writer_.sync();
-        synced = now;
-      }
     }
   });
 }
@@ -32,51 +70,147 @@ std::size_t Recorder::drain() {
     // Ticks first: the changes of a tick are in the ring before its record.
     const std::size_t n = reader_.ticks.pop(ticks_buffer_);
     if (n == 0) return total;
-    std::size_t wanted = 0;
-    for (std::size_t t = 0; t < n; ++t) {
-      wanted += ticks_buffer_[t].voxels_changed;
-      removed_mm3_ += static_cast<double>(ticks_buffer_[t].removed_mm3);
+    std::size_t wanted = 0, got = 0;
+    for (std::size_t t = 0; t < n; ++t) wanted += ticks_buffer_[t].voxels_changed;
+    guarded([&] {
+      if (wanted > changes_buffer_.size()) changes_buffer_.resize(wanted);
+    });
+    for (std::size_t left = wanted; left > 0;) {  // also after a failure, so that the servo's ring does not fill
+      const std::size_t some = reader_.changes.pop({changes_buffer_.data() + (failed() ? 0 : got), std::min(left, changes_buffer_.size())});
+      if (some == 0) break;
+      got += some;
+      left -= some;
     }
-    if (wanted > changes_buffer_.size()) changes_buffer_.resize(wanted);
-    const std::size_t got = reader_.changes.pop({changes_buffer_.data(), wanted});
-    for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
+    for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) guarded([&] { actions_.push_back(a); });
     total += n;
-    try {
-      std::size_t begin = 0, changes_begin = 0;
-      const auto write_up_to = [&](std::size_t end) {
-        std::size_t changes_end = changes_begin;
-        for (std::size_t t = begin; t < end; ++t) changes_end += ticks_buffer_[t].voxels_changed;
-        changes_end = std::min(changes_end, got);
-        if (!failure_ && end > begin)
-          writer_.append({ticks_buffer_.data() + begin, end - begin},
-                         {changes_buffer_.data() + changes_begin, changes_end - changes_begin});
-        begin = end;
-        changes_begin = changes_end;
-      };
-      // An action stands before its tick, whose record may not be here yet.
-      while (!actions_.empty() && actions_.front().tick <= ticks_buffer_[n - 1].tick) {
-        std::size_t at = begin;
-        while (ticks_buffer_[at].tick < actions_.front().tick) ++at;
-        write_up_to(at);
-        if (!failure_) writer_.append(actions_.front());
-        actions_.pop_front();
-      }
-      write_up_to(n);
-      if (failure_) continue;  // keep draining, so that the servo's ring does not fill
-      ticks_ += n;             // told only once the file has them: these survive whatever happens to this process
-    } catch (const Error& e) {
-      failure_ = e;
+    guarded([&] { take(n, got); });
+    taken_ = next_tick_;
+  }
+}
+
+void Recorder::take(std::size_t n, std::size_t got) {
+  std::size_t begin = 0, changes_begin = 0, changes_end = 0;
+  const auto put_up_to = [&](std::size_t end) {
+    if (end > begin) put(begin, end, {changes_buffer_.data() + changes_begin, changes_end - changes_begin});
+    begin = end;
+    changes_begin = changes_end;
+  };
+  for (std::size_t t = 0; t < n; ++t) {
+    const TickRecord& r = ticks_buffer_[t];
+    // What the ring had no room for.
+    if (r.tick > next_tick_) {
+      put_up_to(t);
+      lose(next_tick_, r.tick - next_tick_, true);
     }
+    if (const std::uint64_t dropped = reader_.actions_dropped.load(std::memory_order_relaxed); dropped > actions_dropped_) {
+      put_up_to(t);
+      lose(r.tick, 0, true);
+      actions_dropped_ = dropped;
+    }
+    // An action stands before its tick, whose record may not be here yet.
+    for (; !actions_.empty() && actions_.front().tick <= r.tick; actions_.pop_front()) {
+      put_up_to(t);
+      put(actions_.front());
+    }
+    changes_end = std::min(changes_end + r.voxels_changed, got);
+    next_tick_ = r.tick + 1;
+  }
+  put_up_to(n);
+}
+
+void Recorder::put(std::size_t begin, std::size_t end, std::span<const VoxelChange> changes) {
+  const std::size_t waiting = backlog_->waiting_bytes();
+  if (gap_ && waiting <= most_waiting_ / 2) close_gap();
+  if (!gap_ && waiting <= most_waiting_) {
+    writer_.append({ticks_buffer_.data() + begin, end - begin}, changes);
+    return;
+  }
+  lose(ticks_buffer_[begin].tick, end - begin, false);
+  Meanwhile& now = meanwhile();
+  for (const VoxelChange& c : changes) now.changes[c.voxel] = c.density;
+}
+
+void Recorder::put(const SceneAction& action) {
+  if (!gap_) {
+    writer_.append(action);
+    return;
+  }
+  Meanwhile& now = meanwhile();
+  now.actions.push_back(action);
+  now.ends = looks_at_bone(action);
+}
+
+// What comes now belongs behind an action that looks at bone.
+Recorder::Meanwhile& Recorder::meanwhile() {
+  if (meanwhile_.empty() || meanwhile_.back().ends) meanwhile_.emplace_back();
+  return meanwhile_.back();
+}
+
+void Recorder::lose(std::uint64_t first_tick, std::uint64_t ticks, bool bone) {
+  if (!gap_) gap_ = RecordingGap{first_tick, 0, 0};
+  gap_->ticks += ticks;
+  if (bone) gap_->bone_lost = 1;
+  ticks_lost_ += ticks;
+}
+
+void Recorder::close_gap() {
+  writer_.append(*gap_);
+  gaps_.push_back(*gap_);
+  gap_.reset();
+  std::vector<VoxelChange> changes;
+  for (const Meanwhile& m : std::exchange(meanwhile_, {})) {
+    changes.clear();
+    for (const auto& [voxel, density] : m.changes) changes.push_back({voxel, density});
+    if (!changes.empty()) writer_.append({}, changes);
+    for (const SceneAction& a : m.actions) writer_.append(a);
   }
 }
 
 void Recorder::stop() {
+  if (stopped_) return;
+  stopped_ = true;
   stop_ = true;
   if (thread_.joinable()) thread_.join();
   drain();
-  // What was done after the last tick.
-  for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
-  for (; !actions_.empty() && !failure_; actions_.pop_front()) writer_.append(actions_.front());
+  guarded([&] {
+    // What was done after the last tick.
+    for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
+    for (; !actions_.empty(); actions_.pop_front()) put(actions_.front());
+    if (gap_) close_gap();
+  });
+}
+
+void Recorder::finish(const SessionEnd& given, const std::function<void(std::vector<VoxelChange>&)>& bone) {
+  stop();
+  if (finished_) return;
+  finished_ = true;
+  guarded([&] {
+    if (given.ticks > next_tick_) {
+      lose(next_tick_, given.ticks - next_tick_, true);
+      close_gap();
+    }
+    const bool lost = std::any_of(gaps_.begin(), gaps_.end(), [](const RecordingGap& g) { return g.bone_lost != 0; });
+    if (lost && bone) {
+      std::vector<VoxelChange> all;
+      bone(all);
+      writer_.append({}, all);
+    }
+    SessionEnd end = given;
+    end.ticks_lost = ticks_lost_;
+    writer_.finish(end);
+  });
+}
+
+Recorder::Status Recorder::status() const {
+  Status s;
+  s.ticks = taken_;  // first: what it says is waiting, or written
+  s.ticks_lost = ticks_lost_;
+  s.behind_s = backlog_->behind_s();
+  s.waiting_bytes = backlog_->waiting_bytes();
+  s.failure = backlog_->failure();
+  const std::lock_guard lock(failure_mutex_);
+  if (failure_) s.failure = failure_;
+  return s;
 }
 
 }  // namespace osteo

@@ -46,6 +46,11 @@ void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
   if (rehearsal.pieces() > 1) ImGui::Text("The bone is in %d pieces", rehearsal.pieces());
   ImGui::Text("Removed  %.1f mm3", rehearsal.removed_mm3());
   if (rehearsal.soft() != nullptr) ImGui::Text("Tissue cut off  %.1f mm3", rehearsal.tissue_mm3());
+  if (const std::string trouble = rehearsal.trouble(); !trouble.empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, rehearsal.recording().failure ? kRed : kAmber);
+    ImGui::TextWrapped("%s", trouble.c_str());
+    ImGui::PopStyleColor();
+  }
   const double seconds = static_cast<double>(tick.tick) / rehearsal.rate_hz();
   ImGui::Text("Time  %d:%04.1f", static_cast<int>(seconds) / 60, std::fmod(seconds, 60.0));
 }

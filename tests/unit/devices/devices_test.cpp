@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <random>
+#include <stdexcept>
+#include <thread>
 
 #include "osteo/base/error.h"
 #include "osteo/devices/devices.h"
@@ -276,6 +279,22 @@ TEST(ClosedLoop, MotorsRestWhenTheServoFallsSilent) {
   l.loop.request_stop();
   l.loop.join();
   EXPECT_TRUE(l.wait_for([&] { return length(l.arm.force_n()) < 1e-6; }, 2000));
+}
+
+TEST(HidLink, WhatItsThreadThrowsIsToldAndItTriesAgain) {
+  struct Nobody final : HidHandler {
+    void report(HidPort&, std::span<const std::byte>) override {}
+  } nobody;
+  std::atomic<int> tries{0};
+  const HidLink link(
+      [&](std::string&) -> std::unique_ptr<HidPort> {
+        if (++tries == 1) throw std::runtime_error("the bus has gone");
+        return nullptr;
+      },
+      nobody, 10);
+  while (tries < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(link.trouble(), "the bus has gone");
+  EXPECT_FALSE(link.connected());
 }
 
 }  // namespace

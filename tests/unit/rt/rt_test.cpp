@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <ctime>
 #include <random>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -113,6 +118,44 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   EXPECT_GE(loop.stats().missed_by_machine, 5u);
   EXPECT_GE(monotonic_ns() - begin, 60'000'000);
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
+}
+
+TEST(Loop, HandsOverWhatItsFunctionThrows) {
+  FixedRateLoop loop(1000, [n = 0](std::int64_t) mutable -> bool {
+    if (++n == 3) throw std::runtime_error("in the third tick");
+    return true;
+  });
+  loop.start();
+  loop.join();
+  EXPECT_FALSE(loop.running());
+  ASSERT_TRUE(loop.failure());
+  EXPECT_THROW(std::rethrow_exception(loop.failure()), std::runtime_error);
+}
+
+// Memory that may be locked is limited: the loop must not make others run out of it.
+TEST(Loop, LocksNoMoreMemoryThanItMay) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::geteuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0)) ::_exit(3);
+    rlimit limit{};
+    ::getrlimit(RLIMIT_MEMLOCK, &limit);
+    limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 512UL << 20);
+    ::setrlimit(RLIMIT_MEMLOCK, &limit);
+    bool allocated = false;
+    FixedRateLoop loop(1000, [&](std::int64_t) {
+      void* const p = ::mmap(nullptr, 1UL << 30, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+      allocated = p != MAP_FAILED;
+      return false;
+    });
+    loop.start();
+    loop.join();
+    ::_exit(allocated ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 3) GTEST_SKIP() << "may not become another user";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

@@ -58,6 +58,7 @@ class FootPedal final : HidHandler {
   explicit FootPedal(DeviceModel model, HidLink::Open open) : model_(model), link_(std::move(open), *this, 100) {}
   [[nodiscard]] std::uint32_t pressed() const noexcept { return pressed_; }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+  [[nodiscard]] std::string trouble() const { return link_.trouble(); }
 
  private:
   void report(HidPort&, std::span<const std::byte> report) override {
@@ -80,6 +81,7 @@ class SpaceMouseDevice final : public Device, HidHandler {
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+  [[nodiscard]] std::string trouble() const override { return link_.trouble(); }
 
  private:
   void report(HidPort& port, std::span<const std::byte> report) override;
@@ -110,6 +112,7 @@ class WoodenHapticsDevice final : public Device, HidHandler {
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override;
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
+  [[nodiscard]] std::string trouble() const override { return link_.trouble(); }
   /// Reports too short to be one; they are passed over.
   [[nodiscard]] std::uint64_t garbled() const noexcept { return garbled_; }
 

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -35,14 +36,19 @@ class HidLink {
   HidLink& operator=(const HidLink&) = delete;
   [[nodiscard]] bool connected() const noexcept { return connected_; }
   [[nodiscard]] std::uint64_t reports() const noexcept { return reports_; }
+  /// What its thread threw last, in words; empty: nothing. It then does as after an unplug.
+  [[nodiscard]] std::string trouble() const;
 
  private:
   void run();
+  void read_on();
   Open open_;
   HidHandler& handler_;
   int timeout_ms_;
   std::atomic<bool> stop_{false}, connected_{false};
   std::atomic<std::uint64_t> reports_{0};
+  mutable std::mutex trouble_mutex_;
+  std::string trouble_;
   std::thread thread_;
 };
 

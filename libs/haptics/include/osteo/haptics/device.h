@@ -22,6 +22,8 @@ class Device {
   virtual void feel(Vec3 /*force_n*/, Vec3 /*normal*/, double /*stiffness_n_per_mm*/) noexcept {}
   /// What the guard needs to know of it.
   [[nodiscard]] virtual DeviceTraits traits() const { return {}; }
+  /// What went wrong in threads of its own, in words; empty: nothing. From any thread.
+  [[nodiscard]] virtual std::string trouble() const { return {}; }
   /// False when the device has no more to say (end of a script).
   [[nodiscard]] virtual bool active(std::uint64_t) const noexcept { return true; }
 };

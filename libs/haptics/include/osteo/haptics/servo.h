@@ -24,6 +24,8 @@ class Servo {
   /// Take up what was posted, read the device, compute the force, remove bone, tell the readers. False when the device has ended.
   bool step(std::int64_t lateness_ns) noexcept;
   [[nodiscard]] std::uint64_t ticks() const { return ticks_.load(std::memory_order_relaxed); }
+  /// By the burr, in all ticks; whoever reads the stream may have lost some.
+  [[nodiscard]] double removed_mm3() const { return removed_mm3_.load(std::memory_order_relaxed); }
 
   /// From one other thread: happens at the beginning of the next tick. False while one posted before waits still.
   bool post(const Handover* handover) noexcept;
@@ -38,6 +40,7 @@ class Servo {
   Stream& stream_;
   double dt_s_;
   std::atomic<std::uint64_t> ticks_{0};
+  std::atomic<double> removed_mm3_{0};
   std::atomic<const Handover*> inbox_{nullptr};
   void take_up(std::uint64_t tick) noexcept;
   Vec3 force_n_;

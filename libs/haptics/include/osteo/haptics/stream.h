@@ -76,8 +76,9 @@ struct StreamReader {
   StreamReader(std::size_t tick_capacity, std::size_t change_capacity) : ticks(tick_capacity), changes(change_capacity) {}
   Ring<TickRecord> ticks;
   Ring<VoxelChange> changes;
-  Ring<SceneAction> actions{1 << 10};
-  std::atomic<std::uint64_t> dropped{0};  ///< ticks or their changes lost because the reader was too slow
+  Ring<SceneAction> actions{1 << 12};
+  /// Lost because the reader was too slow: ticks with their changes, and actions.
+  std::atomic<std::uint64_t> dropped{0}, actions_dropped{0};
 };
 
 /// Readers are added before the servo starts.
@@ -90,7 +91,7 @@ class Stream {
   /// Before the tick at whose beginning it happened.
   void publish(const SceneAction& action) noexcept {
     for (const auto& r : readers_) {
-      if (!r->actions.push(action)) r->dropped.fetch_add(1, std::memory_order_relaxed);
+      if (!r->actions.push(action)) r->actions_dropped.fetch_add(1, std::memory_order_relaxed);
     }
   }
   void publish(const TickRecord& tick, std::span<const VoxelChange> changes) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <string>
 #include <thread>
@@ -17,7 +18,7 @@ struct LoopStats {
   std::uint64_t missed_by_work = 0;     ///< periods lost because the function itself ran longer than a period (by its thread's CPU time)
   std::uint64_t missed_by_machine = 0;  ///< periods lost because the wake-up came late, or the thread was taken off its core meanwhile
   bool realtime_granted = false;
-  bool memory_locked = false;
+  bool memory_locked = false;    ///< what is there at the start; what comes later too where no limit (RLIMIT_MEMLOCK) forbids it
   bool idle_states_off = false;  ///< /dev/cpu_dma_latency held at 0 while the loop runs
   std::string realtime_refusal;  ///< empty, or why
 };
@@ -27,7 +28,7 @@ struct LoopStats {
 /// meanwhile are skipped and counted.
 class FixedRateLoop {
  public:
-  /// `tick` returns false to end the loop. It must not throw, allocate or lock.
+  /// `tick` returns false to end the loop. It must not allocate or lock. What it throws ends the loop; see failure().
   FixedRateLoop(double rate_hz, std::function<bool(std::int64_t lateness_ns)> tick);
   ~FixedRateLoop();
   FixedRateLoop(const FixedRateLoop&) = delete;
@@ -39,15 +40,19 @@ class FixedRateLoop {
   [[nodiscard]] bool running() const noexcept { return running_; }
   /// Only after join().
   [[nodiscard]] const LoopStats& stats() const { return stats_; }
+  /// Only after join(): what ended it, or null.
+  [[nodiscard]] std::exception_ptr failure() const { return failure_; }
   /// Whether real-time priority was granted; valid once running() was true.
   [[nodiscard]] bool realtime() const noexcept { return realtime_; }
 
  private:
   void run();
+  void tick_on();
   double rate_hz_;
   std::function<bool(std::int64_t)> tick_;
   std::atomic<bool> stop_{false}, running_{false}, realtime_{false};
   LoopStats stats_;
+  std::exception_ptr failure_;
   std::thread thread_;
 };
 

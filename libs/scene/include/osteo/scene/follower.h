@@ -32,8 +32,13 @@ class Follower {
   Follower(const World& world, const FollowerParts& parts, double rate_hz, const Context& context);
   ~Follower();
 
-  /// Takes what the stream holds, and brings everything up to date. Returns the ticks taken.
+  /// Takes what the stream holds, and brings everything up to date. Returns the ticks taken. Where the stream had to leave ticks out,
+  /// everything is made again from the bone as it is: right again, but that dust then appeared later than it was made, and structures were
+  /// not watched meanwhile.
   std::size_t drain(StreamReader& reader);
+  /// The servo has ended after so many ticks, and drain() took what there was: the last of them may be missing too.
+  void end(std::uint64_t ticks);
+  [[nodiscard]] std::uint64_t ticks_lost() const { return ticks_lost_; }
   /// The world was changed by an action, which the stream will tell of; it was drained as far as it went before.
   void follow(const World& world, const World::Effect& effect);
 
@@ -52,7 +57,6 @@ class Follower {
   [[nodiscard]] Dust* dust() const { return dust_.get(); }
 
   [[nodiscard]] const TickRecord& latest() const { return latest_; }
-  [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
   [[nodiscard]] const std::map<std::uint32_t, StructureEvents>& structure_events() const { return structure_events_; }
 
@@ -91,8 +95,12 @@ class Follower {
   void dust_tick(const TickRecord& tick, std::span<const VoxelChange> changes);
   void await(const World& world, const World::Effect& effect);
   void happen(const SceneAction& action);
+  void happen_next();
+  void update();
   Dusty* dusty_owner(VoxelKey name);
   void lose(const Dusty& from, VoxelKey own, float density);
+  void make_dust(std::span<const VoxelChange> changes);
+  void catch_up();
   [[nodiscard]] static Vec3 place_of(const Dusty& body, VoxelKey own);
 
   FollowerParts parts_;
@@ -106,7 +114,9 @@ class Follower {
   std::vector<TickRecord> ticks_;
   std::vector<VoxelChange> changes_;
   TickRecord latest_;
-  double removed_mm3_ = 0, sawn_mm3_ = 0;
+  double sawn_mm3_ = 0;
+  std::uint64_t next_tick_ = 0, ticks_lost_ = 0;
+  std::size_t happened_before_ = 0;  // actions whose turn comes still, and that have happened to the dust while catching up
   std::map<std::uint32_t, StructureEvents> structure_events_;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "osteo/haptics/servo.h"
 
@@ -19,6 +20,7 @@ class Operation {
   /// After the last step: the stream tells of what was done and not yet taken up.
   void finish() noexcept { servo_.finish(); }
   [[nodiscard]] std::uint64_t ticks() const { return servo_.ticks(); }
+  [[nodiscard]] double removed_mm3() const { return servo_.removed_mm3(); }
   [[nodiscard]] const World& world() const { return world_; }
   [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
 
@@ -26,10 +28,11 @@ class Operation {
   using Done = std::function<void(const World::Effect&)>;
   /// In the thread that also steps; at most one action a tick.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
-  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is waited for. `held`:
-  /// called while nothing is removed and before anything changes, for those that have to be up to date.
-  World::Effect act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
-                         const Done& done = {}, const World::ComponentsOf& components = {});
+  /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is waited for; none when it
+  /// did before the action was tried. `held`: called while nothing is removed and before anything changes, for those that have to be up to
+  /// date.
+  std::optional<World::Effect> act_live(const SceneAction& action, const std::function<bool()>& running, const std::function<void()>& held,
+                                        const Done& done = {}, const World::ComponentsOf& components = {});
 
  private:
   void hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene);

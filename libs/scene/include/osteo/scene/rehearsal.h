@@ -1,6 +1,7 @@
 // A rehearsal put together: world, device, servo, and the readers of its stream.
 #pragma once
 #include <deque>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -33,7 +34,10 @@ struct RehearsalSummary {
   double sawn_mm3 = 0;     ///< by the saw, and crumbs of splits
   double tissue_mm3 = 0;   ///< soft tissue cut off, as at rest
   std::string bone_hash, surface_hash;
-  std::uint64_t dropped = 0;  ///< ticks that a reader lost
+  std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
+  std::vector<RecordingGap> gaps;
+  std::uint64_t ticks_not_followed = 0;  ///< surface and pieces are right all the same; structures were not watched in these ticks
+  bool interrupted = false;              ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
@@ -54,11 +58,12 @@ class Rehearsal {
   /// By the clock, in threads of its own.
   void start();
   [[nodiscard]] bool running() const;
-  /// Ends the threads, takes the rest of the stream, closes the session file. Error(cannot_write) when it could not be
-  /// recorded to the end.
+  /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may wait for the disk), and
+  /// then throws what a thread threw, if one did. Error(cannot_write) when it could not be recorded to the end. Again: the same summary.
   RehearsalSummary stop();
 
-  /// As fast as possible in this thread, up to the device's end. Same bone, surface and session as by the clock.
+  /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be recorded any more. Same
+  /// bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
   /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
@@ -66,9 +71,14 @@ class Rehearsal {
   /// Why the last action that could not be done was not; once.
   std::string take_refusal();
 
+  /// From any thread, while it runs: how the recording does (nothing lost, where none was asked for).
+  [[nodiscard]] Recorder::Status recording() const { return recorder_ ? recorder_->status() : Recorder::Status{}; }
+  /// For people, in a line: recording that has ended, that lost ticks or lags by more than 3 s, a device's thread in trouble. Empty: all well.
+  [[nodiscard]] std::string trouble() const;
+
   /// Latest tick, for display.
   [[nodiscard]] TickRecord latest() const { return latest_.load(); }
-  [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
+  [[nodiscard]] double removed_mm3() const { return operation_.removed_mm3(); }
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
@@ -86,9 +96,11 @@ class Rehearsal {
 
  private:
   void follow();
+  void follow_on();
   std::size_t drain();
-  void perform(const SceneAction& action, bool live);
+  bool perform(const SceneAction& action, bool live);
   std::optional<SceneAction> move_soft();
+  bool run_on(const Context& context);
   RehearsalSummary finish();
 
   std::unique_ptr<Device> device_;
@@ -99,7 +111,7 @@ class Rehearsal {
   StreamReader* reader_ = nullptr;
   Operation operation_;
   Seqlock<TickRecord> latest_;
-  std::atomic<double> removed_mm3_{0}, tissue_mm3_{0};
+  std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
   std::mutex mutex_;  // of world and follower
@@ -109,14 +121,20 @@ class Rehearsal {
   std::string refused_;
   std::uint64_t soft_tick_ = 0;  // of the next update of soft tissue
   std::atomic<bool> stop_{false};
+  std::exception_ptr failure_;  // of the follower's thread, or of what ran in this one
+  std::optional<RehearsalSummary> summary_;
   std::thread thread_;
 };
 
 /// What a replay found.
 struct ReplayResult {
   std::uint64_t ticks = 0, actions = 0;
+  /// That were run again. Behind the first gap nothing can be: the servo's own state there is not known. Bone, surface and dust at the end are
+  /// then compared as the recorded changes give them.
+  std::uint64_t ticks_repeated = 0;
+  std::vector<std::string> losses;  ///< what the session lacks; see losses()
   bool complete = false;   ///< the session was closed properly
-  bool identical = false;  ///< every tick, and (when complete) bone, surface and dust, came out bit for bit the same
+  bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
   std::string difference;  ///< the first one
   std::string bone_hash, surface_hash, dust_hash;
   std::shared_ptr<const World> world;  ///< as the session left it
@@ -127,8 +145,8 @@ struct ReplayResult {
 /// Runs the recorded poses and actions through the same servo. `start` and `anatomy` as the session had them: Error(corrupt), Error(usage)
 /// when they are not.
 [[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context);
-/// Applies the changes and actions of a session, in their order, to the world it began with. Error(corrupt).
-void apply_recorded(const Session& session, World& world);
+/// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given. Error(corrupt).
+void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
 /// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.

@@ -1,45 +1,100 @@
-// Writes the stream to a session file from a thread of its own.
+// Writes the stream to a session file from threads of its own.
 #pragma once
 #include <atomic>
 #include <deque>
 #include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <unordered_map>
+#include <vector>
 
 #include "osteo/base/error.h"
 #include "osteo/session/session_file.h"
 
 namespace osteo {
 
+class Backlog;
+
+/// One thread takes from the stream and makes frames, another waits for the disk; between them frames pile up while the disk stalls: 128 MiB,
+/// which is a minute at 1 kHz with 2.2 KB a tick (0.1 to 0.7 KB are usual). When that is full, ticks are left out and counted until half of
+/// it is written again: a RecordingGap. Of such a time only what bone became and what was done is kept, 8 bytes for each voxel that changed
+/// and 120 for each action.
 class Recorder {
  public:
+  static constexpr std::size_t kMostWaitingBytes = std::size_t{128} << 20;
+  /// Room in the reader's ring for the time in which even the first thread does not come to run: half a minute at 1 kHz.
+  static constexpr std::size_t kTickCapacity = 1 << 15;
+
   /// `reader` belongs to the recorder from now on. Errors: cannot_write.
-  Recorder(StreamReader& reader, const std::filesystem::path& path, const SessionHeader& header);
+  Recorder(StreamReader& reader, const std::filesystem::path& path, const SessionHeader& header)
+      : Recorder(reader, session_file(path), header) {}
+  Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header,
+           std::size_t most_waiting_bytes = kMostWaitingBytes);
+  /// Waits for the disk.
   ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
 
   void start();
-  /// Takes what the stream holds now. Called by the thread, or by hand when it was not started.
+  /// Takes what the stream holds now, and when it was not started writes it: called by the thread, or by hand instead of it.
   std::size_t drain();
-  /// After the servo has stopped: takes the rest and stops the thread; `finish` then closes the file.
+  /// After the servo has stopped: takes the rest. Again: nothing.
   void stop();
-  void finish(const SessionEnd& end) { writer_.finish(end); }
+  /// stop(), and closes the file; waits for the disk. `bone` is asked for all densities of the scene as it is now, when changes were lost.
+  /// What was lost behind the last tick is known from `end.ticks`; `end.ticks_lost` is filled in. Again: nothing.
+  void finish(const SessionEnd& end, const std::function<void(std::vector<VoxelChange>&)>& bone = {});
 
-  [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
-  [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
+  /// From any thread.
+  struct Status {
+    std::uint64_t ticks = 0;  ///< the last that was taken, and one: what comes before is written when nothing waits, or lost
+    std::uint64_t ticks_lost = 0;
+    double behind_s = 0;  ///< since what the disk has not taken yet was ready
+    std::size_t waiting_bytes = 0;
+    std::optional<Error> failure;  ///< a full disk, say: the rehearsal goes on, recording has ended
+  };
+  [[nodiscard]] Status status() const;
+  /// Of the file, after finish().
   [[nodiscard]] std::uint64_t bytes() const { return writer_.bytes(); }
-  /// A full disk, say: the rehearsal goes on, recording has ended. Valid after stop().
-  [[nodiscard]] const std::optional<Error>& failure() const { return failure_; }
+  /// After finish().
+  [[nodiscard]] const std::vector<RecordingGap>& gaps() const { return gaps_; }
 
  private:
+  // Up to an action that looks at densities.
+  struct Meanwhile {
+    std::unordered_map<VoxelKey, float> changes;
+    std::vector<SceneAction> actions;
+    bool ends = false;
+  };
+  void take(std::size_t n, std::size_t changes);
+  void put(std::size_t begin, std::size_t end, std::span<const VoxelChange> changes);
+  void put(const SceneAction& action);
+  void lose(std::uint64_t first_tick, std::uint64_t ticks, bool bone);
+  void close_gap();
+  Meanwhile& meanwhile();
+  void fail(const Error& error);
+  [[nodiscard]] bool failed() const { return failed_; }
+  template <class F>
+  void guarded(F&& f);
+
   StreamReader& reader_;
+  Backlog* backlog_;  // the writer's sink
   SessionWriter writer_;
+  std::size_t most_waiting_;
   std::vector<TickRecord> ticks_buffer_;
   std::vector<VoxelChange> changes_buffer_;
   std::deque<SceneAction> actions_;  // taken from the stream, their ticks not yet
-  std::atomic<std::uint64_t> ticks_{0};
-  double removed_mm3_ = 0;
-  std::atomic<bool> stop_{false};
+  std::uint64_t next_tick_ = 0, actions_dropped_ = 0;
+  std::optional<RecordingGap> gap_;  // not over yet
+  std::vector<Meanwhile> meanwhile_;
+  std::vector<RecordingGap> gaps_;
+  std::atomic<std::uint64_t> taken_{0}, ticks_lost_{0};
+  std::atomic<bool> stop_{false}, failed_{false};
+  bool stopped_ = false, finished_ = false;
+  mutable std::mutex failure_mutex_;
   std::optional<Error> failure_;
   std::thread thread_;
 };
