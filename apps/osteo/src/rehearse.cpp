@@ -182,6 +182,7 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   ordered_json j{{"ticks", r.ticks},         {"actions", r.actions},         {"identical", r.identical},
                  {"complete", r.complete},   {"bone_hash", r.bone_hash},     {"surface_hash", r.surface_hash},
                  {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  if (anatomy.structures) j["structures"] = ordered_json::parse(structures_json(r.structures, *anatomy.structures, session.header.rate_hz));
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
   if (!io.common.quiet) {

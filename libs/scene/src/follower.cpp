@@ -134,12 +134,6 @@ std::size_t Follower::drain(StreamReader& reader) {
       const TickRecord& r = ticks_[t];
       wanted += r.voxels_changed;
       removed_mm3_ += static_cast<double>(r.removed_mm3);
-      if (r.structure == 0) continue;
-      const auto clearance = static_cast<double>(r.clearance_mm);
-      auto& e = structure_events_.try_emplace(r.structure, StructureEvents{clearance, 0, 0}).first->second;
-      e.least_clearance_mm = std::min(e.least_clearance_mm, clearance);
-      e.ticks_touched += (r.flags & kStructureTouched) != 0 ? 1 : 0;
-      e.ticks_injured += (r.flags & kStructureInjured) != 0 ? 1 : 0;
     }
     if (wanted > changes_.size()) changes_.resize(wanted);
     const std::size_t got = reader.changes.pop({changes_.data(), wanted});

@@ -191,7 +191,7 @@ RehearsalSummary Rehearsal::finish() {
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash});
     s.session_bytes = recorder_->bytes();
   }
-  s.structures = follower_->structure_events();
+  s.structures = operation_.renderer().structure_events();
   if (loop_) s.loop = loop_->stats();
   return s;
 }

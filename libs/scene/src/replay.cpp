@@ -91,6 +91,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   while (next != session.actions.end()) act();  // done in the last moment
   result.ticks = session.ticks.size();
   result.actions = session.actions.size();
+  result.structures = operation.renderer().structure_events();
   apply_recorded(session, from_changes);
   result.bone_hash = operation.world().hash();
   if (from_changes.hash() != result.bone_hash) differ("the recorded voxel changes give another bone than the recorded poses");

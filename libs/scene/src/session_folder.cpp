@@ -118,6 +118,18 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
   return anatomy;
 }
 
+std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
+  ordered_json j = ordered_json::array();
+  for (const auto& [value, e] : structures) {
+    j.push_back({{"name", map.name_of(static_cast<std::uint8_t>(value))},
+                 {"value", value},
+                 {"least_clearance_mm", e.least_clearance_mm},
+                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
+                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
+  }
+  return j.dump();
+}
+
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr,
                           const Anatomy& anatomy) {
   ordered_json j;
@@ -150,15 +162,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                      {"fallen_out_of_reach", s.dust->fallen_mm3}};
   }
   if (anatomy.structures) {
-    // Seconds, not ticks: for people. What was never within reach is not listed.
-    j["structures"] = ordered_json::array();
-    for (const auto& [value, e] : s.structures) {
-      j["structures"].push_back({{"name", anatomy.structures->name_of(static_cast<std::uint8_t>(value))},
-                                 {"value", value},
-                                 {"least_clearance_mm", e.least_clearance_mm},
-                                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
-                                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
-    }
+    j["structures"] = ordered_json::parse(structures_json(s.structures, *anatomy.structures, rate_hz));
   }
   if (s.loop) {
     const LoopStats& l = *s.loop;

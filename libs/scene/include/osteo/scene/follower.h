@@ -1,4 +1,4 @@
-// What reads the stream while bone is drilled: surface, pieces, dust, events near structures.
+// What reads the stream while bone is drilled: surface, pieces, dust.
 #pragma once
 #include <deque>
 #include <map>
@@ -17,12 +17,6 @@ struct FollowerParts {
   bool surface = true;
   bool pieces = false;
   bool dust = false;
-};
-
-/// What the burr did near a structure at risk.
-struct StructureEvents {
-  double least_clearance_mm = 0;
-  std::uint64_t ticks_touched = 0, ticks_injured = 0;
 };
 
 /// Keeps up what a scene lists, body by body; the rest is not built. One thread at a time. Everything follows from the stream alone, so a
@@ -54,7 +48,6 @@ class Follower {
   [[nodiscard]] const TickRecord& latest() const { return latest_; }
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
-  [[nodiscard]] const std::map<std::uint32_t, StructureEvents>& structure_events() const { return structure_events_; }
 
  private:
   struct Followed {
@@ -107,7 +100,6 @@ class Follower {
   std::vector<VoxelChange> changes_;
   TickRecord latest_;
   double removed_mm3_ = 0, sawn_mm3_ = 0;
-  std::map<std::uint32_t, StructureEvents> structure_events_;
 };
 
 }  // namespace osteo

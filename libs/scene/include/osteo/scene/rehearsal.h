@@ -119,6 +119,7 @@ struct ReplayResult {
   bool identical = false;  ///< every tick, and (when complete) bone, surface and dust, came out bit for bit the same
   std::string difference;  ///< the first one
   std::string bone_hash, surface_hash, dust_hash;
+  std::map<std::uint32_t, StructureEvents> structures;  ///< as the session's summary has them
   std::shared_ptr<const World> world;  ///< as the session left it
   double removed_mm3 = 0;
   double seconds = 0;

@@ -37,6 +37,9 @@ void apply_haptic_settings(const std::filesystem::path& case_folder, const std::
 /// What the case knows besides bone, as the setup asks for it; names the structures in the setup. Errors: no_input (hardness asked, no HU).
 [[nodiscard]] Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context);
 
+/// What the burr did near each structure at risk, as summary.json lists it: seconds, not ticks; what was never within reach is not there.
+[[nodiscard]] std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map,
+                                          double rate_hz);
 /// Writes summary.json and returns its text.
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr,
                           const Anatomy& anatomy = {});
