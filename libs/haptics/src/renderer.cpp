@@ -66,6 +66,11 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, BrickGrid& bone, const 
 HapticRenderer::~HapticRenderer() = default;
 
 void HapticRenderer::feel(const SceneAction& a) noexcept {
+  // Not a number: nothing is felt, rather than nothing of the bone either.
+  if (!std::all_of(a.values.begin(), a.values.begin() + 8, [](double v) { return std::isfinite(v); })) {
+    soft_ = {};
+    return;
+  }
   soft_.at_mm = {a.values[0], a.values[1], a.values[2]};
   soft_.normal = {a.values[3], a.values[4], a.values[5]};
   soft_.force_n = a.values[6];
