@@ -60,7 +60,8 @@ cli::CommandInfo RehearseCommand::info() {
           "drill the bone of a case, in a window or by script",
           "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
           "servo, and the session, "
-          "pictures from before and after, and a summary are written.",
+          "pictures from before and after, and a summary are written. Dense bone resists the burr more, by the HU that the case keeps "
+          "(\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare"}},
           "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
@@ -136,6 +137,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
       write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
   if (!io.common.quiet) {
+    io.err << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
@@ -289,12 +291,11 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   setup.params.contact.method = p.contact;
   apply_haptic_settings(the_case.folder, p.settings, setup);
   Anatomy anatomy;
-  if (setup.hardness || the_case.files.contains("structures")) {
-    timed("hardness and structures at risk", "nobody: they do not change", [&] {
-      anatomy = anatomy_of(the_case, setup, io.context);
-      return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
-    });
-  }
+  timed("hardness and structures at risk", "nobody: they do not change", [&] {
+    anatomy = anatomy_of(the_case, setup, io.context);
+    return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
+  });
+  j["hardness"] = ordered_json::parse(hardness_json(anatomy));
   if (setup.params.effects.fail_safe)
     timed("distance map", "servo", [&] { return over_bodies(*world, [](const BrickGrid& b) { return DepthMap(b).memory_bytes(); }); });
   timed("surface", "follower", [&] {
@@ -373,6 +374,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   }
   io.out << "together " << format_number(j["memory_mb"]) << " MB; a tick while drilling takes " << format_number(ticks.quantile_us(0.5))
          << " us, p99 " << format_number(ticks.quantile_us(0.99)) << " us, p99.9 " << format_number(ticks.quantile_us(0.999)) << " us\n"
+         << told_hardness(anatomy) << '\n'
          << "threads: servo (real time), recorder, follower (surface, pieces), window\n";
   return 0;
 }

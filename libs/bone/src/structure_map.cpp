@@ -145,7 +145,7 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
     f.origin_mm = f.origin_mm + f.direction * shift;
     return f;
   };
-  const double near_mm = 4 * coarsest, wide = std::max(2 * coarsest, 0.3);
+  const double near_mm = 2 * coarsest, wide = std::max(2 * coarsest, 0.3);
   part.near = field_of(face, around(h, near_mm), near_mm, near_mm, context.sub(0.1, 0.4));
   // A point is between lattice points up to a diagonal away.
   const double kept_mm = far_mm + std::sqrt(3.0) * wide;

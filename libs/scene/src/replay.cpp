@@ -31,7 +31,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
   }
-  if (session.header.haptics.hardness != (anatomy.hardness != nullptr)) {
+  if (session.header.haptics.hardness.value_or(false) != (anatomy.hardness != nullptr)) {
     throw Error(ExitCode::usage, "the session went by the hardness of the bone, which this case does not tell",
                 "the case needs its hu.vdb");
   }

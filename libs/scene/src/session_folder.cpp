@@ -96,16 +96,22 @@ void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, Ha
 
 Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context) {
   Anatomy anatomy;
-  if (setup.hardness) {
-    const auto hu = the_case.files.find("hu");
+  const auto hu = the_case.files.find("hu");
+  if (!setup.hardness) {
+    setup.hardness = hu != the_case.files.end();
+    if (!*setup.hardness) context.warn("the case keeps no HU: all its bone will resist the burr alike");
+  }
+  if (*setup.hardness) {
     if (hu == the_case.files.end()) {
       throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
                   "set \"hardness\" to false, or prepare the case with its hu.vdb");
     }
+    if (setup.hardness_json.empty()) setup.hardness_json = default_hardness_json();
+    const HardnessLaw law = parse_hardness(setup.hardness_json, "the law of hardness");
     const SparseGrid values = load_grid(hu->second);
-    anatomy.hardness = std::make_shared<const Hardness>(to_bricks(the_case.bone), values);
+    anatomy.hardness = std::make_shared<const Hardness>(to_bricks(the_case.bone), values, law);
     if (const auto region = the_case.files.find("region"); region != the_case.files.end())
-      anatomy.region_hardness = std::make_shared<const Hardness>(to_bricks(load_grid(region->second)), values);
+      anatomy.region_hardness = std::make_shared<const Hardness>(to_bricks(load_grid(region->second)), values, law);
   }
   setup.structures.clear();
   if (const auto file = the_case.files.find("structures"); file != the_case.files.end()) {
@@ -116,6 +122,22 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
     }
   }
   return anatomy;
+}
+
+std::string hardness_json(const Anatomy& anatomy) {
+  if (!anatomy.hardness) return "null";
+  HardnessLaw law = anatomy.hardness->law();
+  ordered_json j;
+  for (const FieldRef& f : fields_of<HardnessLaw>(law)) j[std::string(f.doc.name)] = ordered_json::parse(f.to_text());
+  return j.dump();
+}
+
+std::string told_hardness(const Anatomy& anatomy) {
+  if (!anatomy.hardness) return "all bone resists the burr alike";
+  const HardnessLaw& law = anatomy.hardness->law();
+  const double half = law.zero_hu + (law.cortical_hu - law.zero_hu) / 2;
+  return "bone resists the burr by its HU: " + format_number(law.cortical_hu) + " HU as 1, " + format_number(half) + " HU as " +
+         format_number(std::round(100 * law.at(half)) / 100) + R"(; {"osteotome_haptics": 1, "hardness": false} in --settings turns that off)";
 }
 
 std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
@@ -138,6 +160,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["rate_hz"] = rate_hz;
   j["burr"] = burr;
   j["removed_mm3"] = s.removed_mm3;
+  j["hardness"] = ordered_json::parse(hardness_json(anatomy));
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;
   if (s.bodies > 1) j["bodies"] = s.bodies;

@@ -1,5 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
 #include <ctime>
 #include <random>
 #include <thread>
@@ -113,6 +119,32 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   EXPECT_GE(loop.stats().missed_by_machine, 5u);
   EXPECT_GE(monotonic_ns() - begin, 60'000'000);
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
+}
+
+// Where a user may lock 256 MB and no more, the program may still allocate twice that while the loop runs.
+TEST(Loop, LimitedLockedMemoryDoesNotMakeAllocationsFail) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    // Who may not raise the limit keeps a lower one: then nothing is locked, and nothing can fail.
+    const rlimit limit{256u << 20, 256u << 20};
+    static_cast<void>(::setrlimit(RLIMIT_MEMLOCK, &limit));
+    if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(2);
+    std::atomic<int> ticks{0};
+    FixedRateLoop loop(1000, [&](std::int64_t) { return ++ticks < 1'000'000; });
+    loop.start();
+    while (ticks < 3) std::this_thread::yield();
+    void* const much = std::malloc(std::size_t{512} << 20);
+    const bool given = much != nullptr;
+    std::free(much);
+    loop.request_stop();
+    loop.join();
+    ::_exit(given ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

@@ -20,9 +20,9 @@ namespace osteo {
 /// `reach_mm` beyond the surface of any burr of the library.
 /// The face lies between the voxels of the structure and the others, smoothed so that it does not follow their steps, but never across a
 /// voxel's centre: what the map names is inside, however thin. Distances to it are exact at the points of two lattices, as fine as the
-/// labels within four voxels of the face, else twice as coarse (at least 0.3 mm), and linear between them.
-/// Error outside planes, balls and cylinders, in label voxels: mean below 0.08, 0.11 rms, 0.33 at most; of a nerve one voxel thin 0.11,
-/// 0.15, 0.6. Inside up to a lattice step where distances have their ridge.
+/// labels within two voxels of the face, else twice as coarse (at least 0.3 mm), and linear between them.
+/// Error outside planes, balls and cylinders, in label voxels: mean below 0.08, 0.12 rms, 0.36 at most; of a nerve one voxel thin 0.12,
+/// 0.16, 0.6. Inside up to a lattice step where distances have their ridge.
 /// Memory: 4 bytes a point, so about 4 a label voxel near the face and 4 / 8 elsewhere; made in O(voxels of the map). Immutable.
 class StructureMap {
  public:
