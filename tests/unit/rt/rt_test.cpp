@@ -121,20 +121,19 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
 }
 
-// Where a user may lock 256 MB and no more, the program may still allocate twice that while the loop runs.
+// Where a user may lock 1 GB and no more, the program may still allocate twice that while the loop runs.
 TEST(Loop, LimitedLockedMemoryDoesNotMakeAllocationsFail) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    // Who may not raise the limit keeps a lower one: then nothing is locked, and nothing can fail.
-    const rlimit limit{256u << 20, 256u << 20};
-    static_cast<void>(::setrlimit(RLIMIT_MEMLOCK, &limit));
+    const rlimit limit{1u << 30, 1u << 30};
+    if (::setrlimit(RLIMIT_MEMLOCK, &limit) != 0) ::_exit(77);
     if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(2);
     std::atomic<int> ticks{0};
     FixedRateLoop loop(1000, [&](std::int64_t) { return ++ticks < 1'000'000; });
     loop.start();
     while (ticks < 3) std::this_thread::yield();
-    void* const much = std::malloc(std::size_t{512} << 20);
+    void* const much = std::malloc(std::size_t{2} << 30);
     const bool given = much != nullptr;
     std::free(much);
     loop.request_stop();
@@ -144,6 +143,7 @@ TEST(Loop, LimitedLockedMemoryDoesNotMakeAllocationsFail) {
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "the limit on locked memory is lower and may not be raised here";
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
