@@ -83,6 +83,17 @@ TEST(Counting, SeesAllocationAndLock) {
   EXPECT_GT(offences, memory);
 }
 
+// Two plates below the bone's face.
+std::shared_ptr<const StructureMap> some_structures() {
+  Labels labels;
+  labels.frame.dims = {30, 30, 30};
+  labels.frame.origin_mm = {-15, -15, -20};
+  const auto v = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (std::size_t n = 0; n < labels.frame.voxel_count(); ++n) v[n] = n / 900 == 16 ? 1 : n / 900 == 18 ? 2 : 0;
+  labels.voxels = v;
+  return std::make_shared<const StructureMap>(labels);
+}
+
 TEST(Servo, NeitherAllocatesNorLocks) {
 #ifdef OSTEO_NOT_COUNTED
   GTEST_SKIP() << "sanitizers have an allocator of their own";
@@ -93,7 +104,8 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     setup.params.contact.method = method;
     setup.device = SpringHand::traits();
     setup.curve = {{-5, 0, 1}, {0, 3, 0}, {5, 0, 1}};
-    HapticRenderer renderer(setup, bone, {}, 1e-3);
+    const auto hardness = std::make_shared<const Hardness>(bone, to_sparse(bone, "hu"));
+    HapticRenderer renderer(setup, bone, {hardness, nullptr, some_structures()}, 1e-3);
     Stream stream;
     auto& reader = stream.add_reader(1 << 14, 1 << 22);
     Script script;

@@ -157,6 +157,7 @@ struct WindowCommand {
 
     actions.begin(p.resume.empty());
     io.end_progress();
+    if (!io.common.quiet) io.err << told_hardness(options.anatomy) << '\n';
     WindowOptions window;
     window.title = "Osteotome - " + the_case.folder.filename().string();
     window.tool = tool;

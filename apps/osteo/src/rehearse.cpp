@@ -60,7 +60,8 @@ cli::CommandInfo RehearseCommand::info() {
           "drill the bone of a case, in a window or by script",
           "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
           "servo, and the session, "
-          "pictures from before and after, and a summary are written.",
+          "pictures from before and after, and a summary are written. Dense bone resists the burr more, by the HU that the case keeps "
+          "(\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare"}},
           "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
@@ -146,12 +147,13 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
       write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
   if (!io.common.quiet) {
+    io.err << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
     if (s.ticks_not_recorded > 0)
       io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
              << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
     if (s.ticks_not_followed > 0)
-      io.err << "structures were not watched in " << s.ticks_not_followed << " ticks, since the machine did not keep up\n";
+      io.err << "surface, pieces and dust missed " << s.ticks_not_followed << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
       io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999))
@@ -199,6 +201,7 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
                  {"identical", r.identical}, {"complete", r.complete},             {"losses", r.losses},
                  {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},     {"dust_hash", r.dust_hash},
                  {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  if (anatomy.structures) j["structures"] = ordered_json::parse(structures_json(r.structures, *anatomy.structures, session.header.rate_hz));
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
@@ -320,12 +323,11 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   setup.params.contact.method = p.contact;
   apply_haptic_settings(the_case.folder, p.settings, setup);
   Anatomy anatomy;
-  if (setup.hardness || the_case.files.contains("structures")) {
-    timed("hardness and structures at risk", "nobody: they do not change", [&] {
-      anatomy = anatomy_of(the_case, setup, io.context);
-      return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
-    });
-  }
+  timed("hardness and structures at risk", "nobody: they do not change", [&] {
+    anatomy = anatomy_of(the_case, setup, io.context);
+    return (anatomy.hardness ? anatomy.hardness->memory_bytes() : 0) + (anatomy.structures ? anatomy.structures->memory_bytes() : 0);
+  });
+  j["hardness"] = ordered_json::parse(hardness_json(anatomy));
   if (setup.params.effects.fail_safe)
     timed("distance map", "servo", [&] { return over_bodies(*world, [](const BrickGrid& b) { return DepthMap(b).memory_bytes(); }); });
   timed("surface", "follower", [&] {
@@ -404,6 +406,7 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   }
   io.out << "together " << format_number(j["memory_mb"]) << " MB; a tick while drilling takes " << format_number(ticks.quantile_us(0.5))
          << " us, p99 " << format_number(ticks.quantile_us(0.99)) << " us, p99.9 " << format_number(ticks.quantile_us(0.999)) << " us\n"
+         << told_hardness(anatomy) << '\n'
          << "threads: servo (real time), recorder, follower (surface, pieces), window\n";
   return 0;
 }

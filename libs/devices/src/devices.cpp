@@ -23,7 +23,7 @@ Vec3 turned(Vec3 v, Vec3 axis, double angle) {
 Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, double hold_ms, double fade_ms) noexcept {
   if (p.time_ns == 0) return {};
   const double age_ms = static_cast<double>(now_ns - p.time_ns) / 1e6;
-  const double share = age_ms <= hold_ms ? 1 : std::max(0.0, 1 - (age_ms - hold_ms) / fade_ms);
+  const double share = age_ms <= hold_ms ? 1 : std::clamp(1 - (age_ms - hold_ms) / fade_ms, 0.0, 1.0);
   if (!(share > 0)) return {};
   Vec3 force = p.force_n;
   const double deeper = dot(p.position_mm - position_mm, p.normal);

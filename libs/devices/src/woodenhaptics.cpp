@@ -76,6 +76,7 @@ std::array<double, 3> WoodenHapticsKinematics::currents_ma(Vec3 q, Vec3 force_n)
   for (std::size_t a = 0; a < 3; ++a) {
     const double torque_nm = dot(j.column[a], force_n) / 1000;
     ma[a] = 1000 * torque_nm / gear(a) / g_.torque_constant_nm_per_a[a];
+    if (!std::isfinite(ma[a])) return {};
     most = std::max(most, std::abs(ma[a]));
   }
   // All motors together, so that the force keeps its direction.

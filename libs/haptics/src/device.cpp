@@ -18,7 +18,9 @@ DeviceSample SpringHand::step(const HandGoal& goal, double dt_s, Vec3 force_n) n
   const double damping_n_s_per_mm = 2 * std::sqrt(kSpringNPerMm * 1000 * kMassKg) / 1000;
   Vec3 pull = (goal.position_mm - position_mm_) * kSpringNPerMm;
   if (const double n = length(pull); n > kMaxHandN) pull = pull * (kMaxHandN / n);
-  const Vec3 total = pull + force_n - velocity_mm_s_ * damping_n_s_per_mm;
+  Vec3 total = pull + force_n;
+  if (!std::isfinite(dot(total, total))) total = {};  // a goal or force that is no number must not lose the hand for good
+  total -= velocity_mm_s_ * damping_n_s_per_mm;
   velocity_mm_s_ += total * (1000 * dt_s / kMassKg);
   position_mm_ += velocity_mm_s_ * dt_s;
   DeviceSample sample;

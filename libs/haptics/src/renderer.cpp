@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact_models.h"
+#include "osteo/base/error.h"
 #include "osteo/bone/thickness.h"
 
 namespace osteo {
@@ -44,6 +45,11 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, const Anatomy& anatomy,
       dt_s_(dt_s),
       vibration_(setup.vibration_json.empty() ? default_vibration() : parse_vibration(setup.vibration_json, "the session's vibration")),
       guard_(setup_.params.guard, setup.device) {
+  if (!(dt_s > 0) || !(dt_s <= 1)) throw Error(ExitCode::usage, "the servo's rate must be a number from 1 Hz on");
+  if (anatomy_.structures) {
+    clearances_.resize(anatomy_.structures->values().size());
+    events_.assign(clearances_.size(), {anatomy_.structures->reach_mm(), 0, 0});
+  }
   if (setup.curve.size() >= 2) {
     curve_.emplace(setup.curve);
     constraint_.emplace(*curve_, setup.curve_params);
@@ -60,6 +66,11 @@ HapticRenderer::HapticRenderer(const HapticSetup& setup, BrickGrid& bone, const 
 HapticRenderer::~HapticRenderer() = default;
 
 void HapticRenderer::feel(const SceneAction& a) noexcept {
+  // Not a number: nothing is felt, rather than nothing of the bone either.
+  if (!std::all_of(a.values.begin(), a.values.begin() + 8, [](double v) { return std::isfinite(v); })) {
+    soft_ = {};
+    return;
+  }
   soft_.at_mm = {a.values[0], a.values[1], a.values[2]};
   soft_.normal = {a.values[3], a.values[4], a.values[5]};
   soft_.force_n = a.values[6];
@@ -178,6 +189,32 @@ double HapticRenderer::thickness(Vec3 at, Vec3 axis) const noexcept {
   return thickness_mm(bone, own(deepest + away * bone.frame().spacing_mm.x), own.rotation * -away);
 }
 
+// What is at risk belongs to the patient: it goes with the first body.
+void HapticRenderer::watch(const RoundCone& head, Vec3 at, Vec3 axis, bool cuts, TickRecord& r) noexcept {
+  const RigidTransform& own = scene_->items.front().body_from_world;
+  const auto nearest = anatomy_.structures->clearance(head, own(at), own.rotation * axis, clearances_);
+  r.clearance_mm = static_cast<float>(nearest.distance_mm);
+  r.structure = nearest.structure;
+  for (std::size_t s = 0; s < events_.size(); ++s) {
+    StructureEvents& e = events_[s];
+    e.least_clearance_mm = std::min(e.least_clearance_mm, clearances_[s]);
+    if (clearances_[s] > 0) continue;
+    flags_ |= kStructureTouched;
+    ++e.ticks_touched;
+    if (!cuts) continue;
+    flags_ |= kStructureInjured;
+    ++e.ticks_injured;
+  }
+}
+
+std::map<std::uint32_t, StructureEvents> HapticRenderer::structure_events() const {
+  std::map<std::uint32_t, StructureEvents> by_value;
+  for (std::size_t s = 0; s < events_.size(); ++s) {
+    if (events_[s].least_clearance_mm < anatomy_.structures->reach_mm()) by_value.emplace(anatomy_.structures->values()[s], events_[s]);
+  }
+  return by_value;
+}
+
 std::span<const VoxelChange> HapticRenderer::remove(double& removed_mm3) noexcept {
   std::size_t count = 0;
   for (std::size_t i = 0; i < touched_count_; ++i) {
@@ -278,20 +315,14 @@ HapticRenderer::Step HapticRenderer::step(const DeviceSample& sample) noexcept {
 
   TickRecord& r = result.record;
   if (usable && contact_.normal_force_n > 0 && loaded_ != nullptr) r.thickness_mm = static_cast<float>(thickness(at, axis));
-  if (anatomy_.structures && usable && !scene_->plate && !scene_->items.empty()) {
-    // What is at risk belongs to the patient: it goes with the first body.
-    const RigidTransform& own = scene_->items.front().body_from_world;
-    const auto near = anatomy_.structures->clearance(burr.head(), own(at + contact_.shown_offset_mm), own.rotation * axis);
-    r.clearance_mm = static_cast<float>(near.distance_mm);
-    r.structure = near.structure;
-    if (near.structure != 0 && near.distance_mm <= 0)
-      flags_ |= kStructureTouched | (pose.drill_on != 0 ? static_cast<std::uint32_t>(kStructureInjured) : 0U);
-  }
+  // A hand whose force is not back yet, or that is not heard of, neither removes nor injures; nor does a burr that stands still.
+  const bool cuts = pose.drill_on != 0 && with.speed_rpm > 0 && !held_ && (out.flags & (kPoseJumped | kPoseStale)) == 0;
+  if (anatomy_.structures && usable && !scene_->plate && !scene_->items.empty())
+    watch(burr.head(), at + contact_.shown_offset_mm, axis, cuts, r);
 
   double removed = 0;
   if (held_) flags_ |= kHeld;
-  // A hand whose force is not back yet, or that is not heard of, removes nothing.
-  if (pose.drill_on != 0 && !held_ && (out.flags & (kPoseJumped | kPoseStale)) == 0) result.changes = remove(removed);
+  if (cuts) result.changes = remove(removed);
   for (const HapticScene::Item& item : scene_->items) {
     if (item.bone->depth_map_) item.bone->depth_map_->update(item.bone->bone_, {}, kMapBudget);
   }

@@ -1,18 +1,19 @@
 #include "osteo/rt/loop.h"
 
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <string>
 
 namespace osteo {
@@ -37,16 +38,15 @@ std::int64_t thread_cpu_ns() noexcept {
   for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
 }
 
-// Under a limit MCL_FUTURE makes every later allocation beyond it fail, in all threads; CAP_IPC_LOCK is above the limit.
-bool may_lock_all() {
+// Where the system limits what may be locked, locking all that is to come would make later allocations of the whole program fail: there
+// only what there is now is locked.
+bool lock_memory() noexcept {
   rlimit limit{};
-  if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY) return true;
-  constexpr unsigned kIpcLock = 14;
-  std::ifstream status("/proc/thread-self/status");
-  for (std::string word; status >> word;) {
-    if (word == "CapEff:" && status >> word) return (std::strtoull(word.c_str(), nullptr, 16) >> kIpcLock & 1) != 0;
-  }
-  return false;
+  bool unlimited = ::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  std::array<__user_cap_data_struct, 2> may{};
+  if (::syscall(SYS_capget, &header, may.data()) == 0) unlimited = unlimited || (may[0].effective >> CAP_IPC_LOCK & 1U) != 0;
+  return ::mlockall(unlimited ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
 }
 
 }  // namespace
@@ -87,7 +87,7 @@ void FixedRateLoop::tick_on() {
     ::prctl(PR_SET_TIMERSLACK, 1);
   }
   realtime_ = stats_.realtime_granted;
-  stats_.memory_locked = ::mlockall(may_lock_all() ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
+  stats_.memory_locked = lock_memory();
   touch_stack();
   // As long as this file is open with a 0 in it, cores do not fall into sleep that takes long to wake from.
   struct Undo {

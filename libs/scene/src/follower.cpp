@@ -195,12 +195,6 @@ std::size_t Follower::drain(StreamReader& reader) {
       wanted += r.voxels_changed;
       ticks_lost_ += r.tick - next_tick_;
       next_tick_ = r.tick + 1;
-      if (r.structure == 0) continue;
-      const auto clearance = static_cast<double>(r.clearance_mm);
-      auto& e = structure_events_.try_emplace(r.structure, StructureEvents{clearance, 0, 0}).first->second;
-      e.least_clearance_mm = std::min(e.least_clearance_mm, clearance);
-      e.ticks_touched += (r.flags & kStructureTouched) != 0 ? 1 : 0;
-      e.ticks_injured += (r.flags & kStructureInjured) != 0 ? 1 : 0;
     }
     if (wanted > changes_.size()) changes_.resize(wanted);
     const std::size_t got = reader.changes.pop({changes_.data(), wanted});

@@ -251,7 +251,7 @@ RehearsalSummary Rehearsal::finish() {
   s.voxel_mm3 = voxel_mm3_;
   s.bodies = operation_.world().bodies().size();
   s.fixtures = operation_.world().fixtures();
-  s.structures = follower_->structure_events();
+  s.structures = operation_.renderer().structure_events();
   if (loop_) s.loop = loop_->stats();
   if (recorder_) {
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash}, [&](std::vector<VoxelChange>& all) {

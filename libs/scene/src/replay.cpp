@@ -45,7 +45,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
   }
-  if (session.header.haptics.hardness != (anatomy.hardness != nullptr)) {
+  if (session.header.haptics.hardness.value_or(false) != (anatomy.hardness != nullptr)) {
     throw Error(ExitCode::usage, "the session went by the hardness of the bone, which this case does not tell",
                 "the case needs its hu.vdb");
   }
@@ -111,6 +111,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   result.ticks = session.ticks.size();
   result.ticks_repeated = repeated.size();
   result.actions = session.actions.size();
+  result.structures = operation.renderer().structure_events();
   Applied done;
   if (gap == nullptr || gap->bytes == 0) {  // damage may have taken the changes of the ticks before it
     apply(session, from_changes, done, gap ? gap->changes_before : session.changes.size(),

@@ -113,16 +113,22 @@ void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, Ha
 
 Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context) {
   Anatomy anatomy;
-  if (setup.hardness) {
-    const auto hu = the_case.files.find("hu");
+  const auto hu = the_case.files.find("hu");
+  if (!setup.hardness) {
+    setup.hardness = hu != the_case.files.end();
+    if (!*setup.hardness) context.warn("the case keeps no HU: all its bone will resist the burr alike");
+  }
+  if (*setup.hardness) {
     if (hu == the_case.files.end()) {
       throw Error(ExitCode::no_input, "the case keeps no HU, so that nothing tells how hard its bone is",
                   "set \"hardness\" to false, or prepare the case with its hu.vdb");
     }
+    if (setup.hardness_json.empty()) setup.hardness_json = default_hardness_json();
+    const HardnessLaw law = parse_hardness(setup.hardness_json, "the law of hardness");
     const SparseGrid values = load_grid(hu->second);
-    anatomy.hardness = std::make_shared<const Hardness>(to_bricks(the_case.bone), values);
+    anatomy.hardness = std::make_shared<const Hardness>(to_bricks(the_case.bone), values, law);
     if (const auto region = the_case.files.find("region"); region != the_case.files.end())
-      anatomy.region_hardness = std::make_shared<const Hardness>(to_bricks(load_grid(region->second)), values);
+      anatomy.region_hardness = std::make_shared<const Hardness>(to_bricks(load_grid(region->second)), values, law);
   }
   setup.structures.clear();
   if (const auto file = the_case.files.find("structures"); file != the_case.files.end()) {
@@ -135,6 +141,34 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
   return anatomy;
 }
 
+std::string hardness_json(const Anatomy& anatomy) {
+  if (!anatomy.hardness) return "null";
+  HardnessLaw law = anatomy.hardness->law();
+  ordered_json j;
+  for (const FieldRef& f : fields_of<HardnessLaw>(law)) j[std::string(f.doc.name)] = ordered_json::parse(f.to_text());
+  return j.dump();
+}
+
+std::string told_hardness(const Anatomy& anatomy) {
+  if (!anatomy.hardness) return "all bone resists the burr alike";
+  const HardnessLaw& law = anatomy.hardness->law();
+  const double half = law.zero_hu + (law.cortical_hu - law.zero_hu) / 2;
+  return "bone resists the burr by its HU: " + format_number(law.cortical_hu) + " HU as 1, " + format_number(half) + " HU as " +
+         format_number(std::round(100 * law.at(half)) / 100) + R"(; {"osteotome_haptics": 1, "hardness": false} in --settings turns that off)";
+}
+
+std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
+  ordered_json j = ordered_json::array();
+  for (const auto& [value, e] : structures) {
+    j.push_back({{"name", map.name_of(static_cast<std::uint8_t>(value))},
+                 {"value", value},
+                 {"least_clearance_mm", e.least_clearance_mm},
+                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
+                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
+  }
+  return j.dump();
+}
+
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr,
                           const Anatomy& anatomy) {
   ordered_json j;
@@ -143,6 +177,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["rate_hz"] = rate_hz;
   j["burr"] = burr;
   j["removed_mm3"] = s.removed_mm3;
+  j["hardness"] = ordered_json::parse(hardness_json(anatomy));
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;
   if (s.bodies > 1) j["bodies"] = s.bodies;
@@ -159,7 +194,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
     for (const RecordingGap& g : s.gaps)
       j["gaps"].push_back({{"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bone_changes_lost", g.bone_lost != 0}});
   }
-  if (s.ticks_not_followed > 0) j["ticks_not_watched_near_structures"] = s.ticks_not_followed;
+  if (s.ticks_not_followed > 0) j["ticks_not_followed"] = s.ticks_not_followed;
   if (s.interrupted) j["interrupted"] = true;
   if (!s.pieces.empty()) {
     j["pieces"] = ordered_json::array();
@@ -175,15 +210,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                      {"fallen_out_of_reach", s.dust->fallen_mm3}};
   }
   if (anatomy.structures) {
-    // Seconds, not ticks: for people. What was never within reach is not listed.
-    j["structures"] = ordered_json::array();
-    for (const auto& [value, e] : s.structures) {
-      j["structures"].push_back({{"name", anatomy.structures->name_of(static_cast<std::uint8_t>(value))},
-                                 {"value", value},
-                                 {"least_clearance_mm", e.least_clearance_mm},
-                                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
-                                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
-    }
+    j["structures"] = ordered_json::parse(structures_json(s.structures, *anatomy.structures, rate_hz));
   }
   if (s.loop) {
     const LoopStats& l = *s.loop;

@@ -78,7 +78,16 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
       if (key == "tools") {
         set_tool_methods(value, name, setup);
       } else if (key == "hardness") {
-        setup.hardness = value.get<bool>();
+        if (value == "auto") {
+          setup.hardness.reset();
+        } else if (value.is_boolean()) {
+          setup.hardness = value.get<bool>();
+        } else {
+          throw Error(ExitCode::usage, name + ": \"hardness\" must be true, false or \"auto\"");
+        }
+      } else if (key == "hardness_file") {
+        setup.hardness_json = read_text(beside());
+        static_cast<void>(parse_hardness(setup.hardness_json, "'" + beside().string() + "'"));
       } else if (key == "curve_file") {
         setup.curve = load_points(beside());
         if (setup.curve.size() < 2) throw Error(ExitCode::usage, name + ": the curve has fewer than 2 points");
@@ -88,7 +97,7 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
       } else {
         const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
         if (f == fields.end()) {
-          std::vector<std::string> known{"tools", "hardness", "curve_file", "vibration_file"};
+          std::vector<std::string> known{"tools", "hardness", "hardness_file", "curve_file", "vibration_file"};
           for (const FieldRef& r : fields) known.emplace_back(r.doc.name);
           const std::string near = nearest_name(key, known);
           throw Error(ExitCode::usage, name + " has no setting \"" + key + "\"" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),
@@ -117,7 +126,8 @@ std::string haptic_settings_json(const HapticSetup& setup) {
     if (!f.doc.unit.empty()) text += ", " + std::string(f.doc.unit);
     text += "\n";
   }
-  text += std::string("  \"hardness\": ") + (setup.hardness ? "true" : "false") + "  // removal goes by the HU of the case\n}\n";
+  text += std::string("  \"hardness\": ") + (!setup.hardness ? "\"auto\"" : *setup.hardness ? "true" : "false") +
+          "  // dense bone resists the burr more, by the HU of the case; auto: where it keeps them; false: all bone alike\n}\n";
   return text;
 }
 

@@ -62,7 +62,8 @@ ordered_json to_json(const HapticSetup& h) {
                  {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
   j["tool_methods"] = ordered_json::array();
   for (const auto& [tool, method] : h.tool_methods) j["tool_methods"].push_back({tool, static_cast<int>(method)});
-  j["hardness"] = h.hardness;
+  j["hardness"] = h.hardness.value_or(false);
+  j["hardness_law"] = h.hardness_json;
   j["structures"] = h.structures;
   j["vibration"] = h.vibration_json;
   j["curve"] = ordered_json::array();
@@ -83,7 +84,8 @@ HapticSetup setup_of(const ordered_json& j) {
       throw Error(ExitCode::corrupt, "it names an unknown method of contact");
     h.tool_methods[t.at(0)] = static_cast<ContactMethod>(method);
   }
-  h.hardness = j.at("hardness");
+  h.hardness = j.at("hardness").get<bool>();
+  h.hardness_json = j.value("hardness_law", "");
   h.structures = j.at("structures");
   h.vibration_json = j.at("vibration");
   for (const auto& p : j.at("curve")) h.curve.push_back({p.at(0), p.at(1), p.at(2)});

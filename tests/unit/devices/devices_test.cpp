@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <fstream>
 #include <random>
@@ -151,6 +152,29 @@ TEST(Extrapolation, FollowsThePlaneThenFades) {
   EXPECT_DOUBLE_EQ(at(0, 26), 0);
   EXPECT_EQ(length(extrapolate({}, {0, 0, 0}, 5)), 0);
   EXPECT_EQ(length(extrapolate(p, {NAN, 0, 0}, p.time_ns)), 1);
+}
+
+// Whatever the servo left there and wherever the arm says it is: a finite force within bounds, and so are the motors' currents.
+TEST(Extrapolation, AnyBitsGiveAFiniteForceAndCurrents) {
+  std::mt19937_64 random(17);
+  std::uniform_real_distribution<double> u(-3, 3);
+  const WoodenHapticsGeometry geometry;
+  const WoodenHapticsKinematics arm(geometry);
+  for (int n = 0; n < 300000; ++n) {
+    const auto one = [&] { return random() % 4 == 0 ? std::bit_cast<double>(random()) : u(random); };
+    ForcePlane p;
+    p.force_n = {one(), one(), one()};
+    p.normal = {one(), one(), one()};
+    p.position_mm = {one(), one(), one()};
+    p.stiffness_n_per_mm = one();
+    p.time_ns = 1 + static_cast<std::int64_t>(random() % 2'000'000'000);
+    const Vec3 f = extrapolate(p, {one(), one(), one()}, static_cast<std::int64_t>(random() % 2'000'000'000), one(), one());
+    ASSERT_TRUE(std::isfinite(length(f))) << n;
+    ASSERT_FALSE(length(f) > (2 * length(p.force_n) + 0.5) * (1 + 1e-12)) << n;
+    for (const double ma : arm.currents_ma({one(), one(), one()}, random() % 2 == 0 ? f : Vec3{one(), one(), one()})) {
+      ASSERT_LE(std::abs(ma), 1000 * geometry.max_current_a * (1 + 1e-12)) << n;
+    }
+  }
 }
 
 TEST(Recording, IsReadAndRefusedWithTheLine) {

@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <numbers>
 #include <random>
 
+#include "osteo/base/error.h"
 #include "osteo/bone/depth_map.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/haptics/servo.h"
@@ -396,6 +398,132 @@ TEST(Removal, TurnsFasterAndSofterBoneGivesMore) {
   Removal(most_hits(0.5)).remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, 30000, 1e-3, nullptr, slow);
   Removal(most_hits(0.5)).remove(copy, model->cut(copy), burr_library()[3], r.normal_force_n, 60000, 1e-3, nullptr, fast);
   EXPECT_NEAR(fast / slow, 2, 1e-3);
+}
+
+// HU by depth; where it is not said otherwise, cortex of 1500 HU down to 5 mm, below it cancellous bone of 500 HU.
+std::shared_ptr<const Hardness> layered(
+    const BrickGrid& bone, const HardnessLaw& law = {}, double (*hu_at)(double z) = [](double z) { return z > -5 ? 1500.0 : 500.0; }) {
+  BrickGrid hu(bone);
+  for (VoxelKey v = 0; v < hu.brick_count() * BrickGrid::kVoxels; ++v) {
+    const Ijk c = hu.coordinate(v);
+    hu.set(v, static_cast<float>(hu_at(hu.frame().world_from_index({0, 0, double(c.k)}).z)));
+  }
+  return std::make_shared<const Hardness>(bone, to_sparse(hu, "hu"), law);
+}
+
+TEST(Hardness, FollowsItsLaw) {
+  const HardnessLaw law = parse_hardness(default_hardness_json(), "built in");
+  for (const double hu : {-500.0, 100.0, 400.0, 500.0, 1500.0, 2000.0, 9000.0}) {
+    EXPECT_NEAR(law.at(hu), std::clamp(hu / 1500, 0.125, 3.0), 1e-12);
+    EXPECT_EQ(law.at(hu), HardnessLaw{}.at(hu));
+  }
+  const HardnessLaw other = parse_hardness(R"({"osteotome_hardness": 1, "cortical_hu": 1000, "zero_hu": -100, "exponent": 2, "least": 0.05})", "x");
+  EXPECT_NEAR(other.at(450), 0.25, 1e-12);
+  EXPECT_EQ(other.at(-100), 0.05);
+  auto bone = slab(0.5);
+  const auto h = layered(bone, other);
+  const auto at_z = [&](int k) { return static_cast<double>(h->at(bone.find(10, 10, k))); };
+  EXPECT_NEAR(at_z(31), std::pow(1600.0 / 1100, 2), 1 / 100.0);
+  EXPECT_NEAR(at_z(10), std::pow(600.0 / 1100, 2), 1 / 100.0);
+}
+
+TEST(Hardness, TheFileIsCheckedWithKeyAndLine) {
+  const auto refused = [](const std::string& text, const std::string& part) {
+    try {
+      static_cast<void>(parse_hardness(text, "'h.json'"));
+      ADD_FAILURE() << "taken: " << text;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::usage);
+      EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
+      EXPECT_NE(std::string(e.what()).find("'h.json'"), std::string::npos) << e.what();
+    }
+  };
+  refused("{", "line 1");
+  refused("[]", "must be 1");
+  refused(R"({"osteotome_hardness": 2})", "must be 1");
+  refused("{\"osteotome_hardness\": 1,\n \"exponnet\": 1}", "line 2");
+  refused("{\"osteotome_hardness\": 1,\n \"exponnet\": 1}", "did you mean \"exponent\"");
+  refused("{\"osteotome_hardness\": 1,\n\n \"exponent\": 9}", "line 3");
+  refused(R"({"osteotome_hardness": 1, "exponent": "1"})", "must be a number");
+  refused(R"({"osteotome_hardness": 1, "most": 5})", "most");
+  refused(R"({"osteotome_hardness": 1, "cortical_hu": 100, "zero_hu": 200})", "below");
+}
+
+// The burr fed down through cortex into cancellous bone, at a given speed and by a hand on a spring: what presses on it in either.
+struct Layers {
+  double cortex_n = 0, cancellous_n = 0;
+  [[nodiscard]] double step() const { return (cortex_n - cancellous_n) / cortex_n; }
+};
+Layers fed(bool hard, double h, double hz, double mm_s = 1) {
+  auto bone = slab(h);
+  HapticSetup setup;
+  setup.params.effects.vibration = setup.params.effects.shaft = false;
+  setup.device = SpringHand::traits();
+  HapticRenderer renderer(setup, bone, {hard ? layered(bone) : nullptr, nullptr, nullptr}, 1 / hz);
+  Layers sum;
+  int in_cortex = 0, in_cancellous = 0;
+  for (int t = 0; t < static_cast<int>(9 / mm_s * hz); ++t) {
+    const double deep = mm_s * t / hz;  // of the burr's lowest point
+    auto pose = at(0, 0, 2 - deep);
+    pose.axis = {1, 0, 0};
+    pose.drill_on = 1;
+    const double n = static_cast<double>(renderer.step(pose).record.normal_force_n);
+    // The head all in the one or the other; walls beside it alike.
+    if (deep > 4 && deep < 4.9) {
+      sum.cortex_n += n;
+      ++in_cortex;
+    }
+    if (deep > 8 && deep < 8.9) {
+      sum.cancellous_n += n;
+      ++in_cancellous;
+    }
+  }
+  return {sum.cortex_n / in_cortex, sum.cancellous_n / in_cancellous};
+}
+
+// What a hand can tell apart: 7 % (X. Pang, H. Tan, N. Durlach, Percept Psychophys 49(6), 1991, from 2.5 to 10 N); 10 % to be careful.
+TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
+  constexpr double kNoticed = 0.10;
+  const Layers alike = fed(false, 0.5, 1000), hard = fed(true, 0.5, 1000);
+  std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n", alike.cortex_n, alike.cancellous_n,
+              100 * alike.step(), hard.cortex_n, hard.cancellous_n, 100 * hard.step());
+  EXPECT_LT(std::abs(alike.step()), kNoticed / 2);
+  EXPECT_GT(hard.step(), 2 * kNoticed);
+  EXPECT_GT(hard.step(), 0.4);  // 500 HU against 1500: two thirds, less what the hole is wider in soft bone
+  for (const auto& [h, hz] : {std::pair{0.35, 500.0}, {0.7, 1000.0}, {0.5, 2000.0}}) {
+    EXPECT_NEAR(fed(true, h, hz).step(), hard.step(), 0.12) << h << " mm, " << hz << " Hz";
+  }
+}
+
+// What a hand of constant force takes out in a time goes by the bone alone, also where hard and soft lie under the burr at once.
+TEST(Hardness, RemovalIsTheSameForAnyVoxelAndTick) {
+  const auto drilled = [](double h, double hz) {
+    auto bone = slab(h);
+    HapticSetup setup;
+    setup.params.effects.vibration = false;
+    setup.device = SpringHand::traits();
+    const auto softer_below = layered(bone, {}, [](double z) { return std::clamp(1500 + 700 * z, 300.0, 1800.0); });
+    HapticRenderer renderer(setup, bone, {softer_below, nullptr, nullptr}, 1 / hz);
+    SpringHand hand;
+    double removed = 0;
+    Vec3 force{};
+    for (int t = 0; t < static_cast<int>(2 * hz); ++t) {
+      const double s = t / hz;
+      HandGoal goal;
+      goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
+      goal.axis = {0.6F, 0, 0.8F};
+      goal.drill_on = 1;
+      goal.tool = 3;
+      const auto record = renderer.step(hand.step(goal, 1 / hz, force)).record;
+      force = from_floats(record.force_n);
+      removed += static_cast<double>(record.removed_mm3);
+    }
+    return removed;
+  };
+  const double reference = drilled(0.5, 1000);
+  EXPECT_GT(reference, 4);
+  for (const auto& [h, hz] : {std::pair{0.35, 1000.0}, {0.75, 1000.0}, {0.5, 500.0}, {0.5, 3000.0}})
+    EXPECT_NEAR(drilled(h, hz) / reference, 1, 0.05) << h << " mm, " << hz << " Hz";
 }
 
 TEST(DepthMap, EqualsOneMadeAnewAfterDrilling) {

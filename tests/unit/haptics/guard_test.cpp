@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
 
+#include "osteo/base/error.h"
 #include "osteo/haptics/renderer.h"
 #include "slab.h"
 #include "solid.h"
@@ -274,6 +277,133 @@ TEST(Guard, StiffnessFollowsTickDelayAndDamping) {
   auto soft = plain;
   soft.max_stiffness_n_per_mm = 0.4;
   EXPECT_EQ(safe_stiffness_n_per_mm(soft, 1, 1e-3), 0.4);
+}
+
+double any_bits(std::mt19937_64& random) {
+  return std::bit_cast<double>(random());
+}
+
+// Any bit patterns at all for whatever it is given or made with: what comes out is finite and within the limits of force and rate.
+TEST(Fuzz, TheGuardLetsNothingThatIsNoNumberThrough) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> u(-1, 1);
+  // Mostly plausible, so that one bad value at a time meets all the good ones; now and then everything is bad.
+  const auto one = [&](double most, int bad) { return static_cast<int>(random() % 100) < bad ? any_bits(random) : most * u(random); };
+  for (int round = 0; round < 4000; ++round) {
+    const int bad = round % 4 == 0 ? 100 : round % 4 == 1 ? 0 : 5;
+    const bool bad_limits = round % 8 >= 6;
+    GuardParams p;
+    DeviceTraits d;
+    for (double* const x : {&p.max_rate_n_per_s, &p.max_force_n, &p.max_damping_n_s_per_m, &p.contact_damping_n_s_per_m, &p.resume_s, &p.stale_ms,
+                            &p.fade_ms, &d.damping_n_s_per_m, &d.delay_s, &d.encoder_mm, &d.max_force_n, &d.max_stiffness_n_per_mm}) {
+      if (bad_limits && random() % 3 == 0) *x = any_bits(random);
+    }
+    p.passivity = random() % 2 == 0;
+    const auto strict = [](double limit) { return limit > 0 ? limit : 0; };
+    const double most = std::min(strict(p.max_force_n), strict(d.max_force_n));
+    const double stiffness = safe_stiffness_n_per_mm(d, p.contact_damping_n_s_per_m, bad_limits ? any_bits(random) : 1e-3);
+    EXPECT_GE(stiffness, 0);
+    Guard guard(p, d);
+    Vec3 last{};
+    for (int t = 0; t < 60; ++t) {
+      Guard::Input in;
+      for (std::size_t a = 0; a < 3; ++a) {
+        in.position_mm[a] = one(50, bad);
+        in.elastic_n[a] = one(10, bad);
+        in.normal[a] = one(1, bad);
+        in.effects_n[a] = one(1, bad);
+      }
+      if (random() % 2 == 0) in.normal = normalized(in.normal);
+      in.age_ms = one(20, bad);
+      in.jumped = random() % 10 == 0;
+      const double dt = static_cast<int>(random() % 100) < bad ? any_bits(random) : 1e-3;
+      const Vec3 f = guard.limit(in, dt).force_n;
+      ASSERT_TRUE(std::isfinite(f.x) && std::isfinite(f.y) && std::isfinite(f.z)) << round << ' ' << t;
+      ASSERT_LE(length(f), most * (1 + 1e-12) + 1e-150) << round << ' ' << t;
+      const double step = std::isfinite(dt) && dt > 0 ? dt : 1e-3;
+      if (p.max_rate_n_per_s != 0) {
+        ASSERT_LE(length(f - last), strict(p.max_rate_n_per_s * step) * (1 + 1e-9) + 1e-12 * most) << round << ' ' << t;
+      }
+      ASSERT_TRUE(std::isfinite(guard.energy_mj()) && std::isfinite(length(guard.velocity_mm_s()))) << round << ' ' << t;
+      last = f;
+    }
+    // It has not lost itself: with plausible input the force comes.
+    if (bad_limits) continue;
+    for (int t = 0; t < 300; ++t) last = guard.limit({{0, 0, 1}, {0, 0, 2}, {0, 0, 1}, {}, 0, false}, 1e-3).force_n;
+    ASSERT_NEAR(last.z, 2, 1e-9) << round;
+  }
+}
+
+TEST(Guard, ANormalThatIsNoNumberLeavesTheForce) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Guard guard({}, {}), without({}, {});
+    for (int t = 0; t < 5; ++t) {
+      const Vec3 f = guard.limit({{0, 0, 1 - 0.01 * t}, {0, 0, 2}, {bad, 0, 1}, {}, 0, false}, 1e-3).force_n;
+      EXPECT_EQ(f, without.limit({{0, 0, 1 - 0.01 * t}, {0, 0, 2}, {}, {}, 0, false}, 1e-3).force_n);
+      EXPECT_GT(f.z, 1.9);
+    }
+  }
+}
+
+// The bytes of a report may be anything: every number of every record stays finite, and force and rate within their limits.
+TEST(Fuzz, AnyBytesFromADeviceGiveFiniteRecords) {
+  const auto number = [](const TickRecord& r) {
+    double sum = static_cast<double>(r.normal_force_n) + static_cast<double>(r.depth_mm) + static_cast<double>(r.removed_mm3) +
+                 static_cast<double>(r.energy_mj) + static_cast<double>(r.thickness_mm) + static_cast<double>(r.clearance_mm);
+    for (std::size_t a = 0; a < 3; ++a)
+      sum += static_cast<double>(r.force_n[a]) + static_cast<double>(r.torque_n_mm[a]) + static_cast<double>(r.shown_offset_mm[a]);
+    return sum;
+  };
+  for (const ContactMethod method : kMethods) {
+    auto bone = test::solid(0.5, 8, [](Vec3 p) { return std::sin(p.x) + std::sin(1.3 * p.y) + std::sin(0.9 * p.z) < 0.2; });
+    const HapticSetup setup = setup_for(method);
+    HapticRenderer renderer(setup, bone, {}, 1e-3);
+    Vec3 last{};
+    std::mt19937_64 random(13);
+    std::uniform_real_distribution<float> u(-8, 8);
+    for (int t = 0; t < 1500; ++t) {
+      DeviceSample s;
+      std::array<std::uint64_t, 4> bits{random(), random(), random(), random()};
+      std::memcpy(static_cast<void*>(&s), bits.data(), sizeof s);
+      // Half the time in or near the bone, with one part of it broken or none.
+      if (random() % 2 == 0) s.position_mm = {u(random), u(random), u(random)};
+      if (random() % 4 == 0) s.position_mm[random() % 3] = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
+      if (random() % 2 == 0) s.age_ms = 0;
+      if (random() % 50 == 0) {
+        SceneAction yield;
+        for (double& v : yield.values) v = random() % 4 == 0 ? any_bits(random) : static_cast<double>(u(random));
+        renderer.feel(yield);
+      }
+      const auto [record, changes] = renderer.step(s);
+      const Vec3 f = from_floats(record.force_n);
+      ASSERT_TRUE(std::isfinite(number(record))) << t;
+      ASSERT_LE(length(f), 3.3 * (1 + 1e-6)) << t;
+      ASSERT_LE(length(f - last), setup.params.guard.max_rate_n_per_s * 1e-3 * (1 + 1e-5)) << t;
+      last = f;
+    }
+    for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) ASSERT_TRUE(bone.value(v) >= 0 && bone.value(v) <= 1);
+  }
+}
+
+TEST(Renderer, ARateThatIsNoNumberIsRefused) {
+  auto bone = test::slab(1);
+  for (const double dt : {0.0, -1e-3, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    EXPECT_THROW(HapticRenderer(setup_for(ContactMethod::overlap), bone, {}, dt), Error) << dt;
+}
+
+TEST(SpringHand, AGoalOrForceThatIsNoNumberDoesNotLoseIt) {
+  SpringHand hand;
+  HandGoal goal;
+  static_cast<void>(hand.step(goal, 1e-3, {}));
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    goal.position_mm = {bad, 0, 0};
+    static_cast<void>(hand.step(goal, 1e-3, {}));
+    goal.position_mm = {1, 0, 0};
+    static_cast<void>(hand.step(goal, 1e-3, {0, bad, 0}));
+    DeviceSample s;
+    for (int t = 0; t < 500; ++t) s = hand.step(goal, 1e-3, {});
+    EXPECT_NEAR(s.position_mm[0], 1, 1e-3);
+  }
 }
 
 // Anything a device may say, for a hundred thousand ticks; osteo bench haptics does a hundred million.

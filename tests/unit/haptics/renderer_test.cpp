@@ -186,7 +186,7 @@ TEST(Structures, ClearanceThicknessAndInjury) {
   TickRecord record;
   for (int t = 0; t < 200; ++t) record = r.step(at({0, 0, 5 - 0.018 * t}, {1, 0, 0}, false)).record;
   EXPECT_EQ(record.structure, 6u);
-  EXPECT_NEAR(record.clearance_mm, 3, 0.5);  // the tool is shown at the surface, 3 mm above
+  EXPECT_NEAR(record.clearance_mm, 3.25, 0.06);  // the tool is shown at the surface; three voxels of 0.5 mm make the nerve
   EXPECT_EQ(record.flags & (kStructureTouched | kStructureInjured), 0u);
   EXPECT_EQ(record.thickness_mm, 10);  // the slab is thicker than the reach
   // The bone above it gone, the burr comes down on the nerve.
@@ -197,6 +197,161 @@ TEST(Structures, ClearanceThicknessAndInjury) {
   EXPECT_EQ(record.flags & kStructureInjured, 0u);
   record = r.step(at({0, 0, -2.2}, {1, 0, 0}, true)).record;
   EXPECT_NE(record.flags & kStructureInjured, 0u);
+}
+
+BrickGrid no_bone() {
+  auto bone = test::slab(1);
+  for (std::uint32_t key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) bone.set(key, 0);
+  return bone;
+}
+
+// Two flat structures, 3 below z = 0 and 7 beyond x = 4, in voxels whose borders lie there.
+std::shared_ptr<const StructureMap> floor_and_wall() {
+  Labels labels;
+  labels.frame.dims = {60, 40, 40};
+  labels.frame.spacing_mm = {0.25, 0.25, 0.25};
+  labels.frame.origin_mm = {-5 + 0.125, -5 + 0.125, -5 + 0.125};
+  const auto v = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  std::size_t n = 0;
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 60; ++i, ++n) {
+        const Vec3 p = labels.frame.world_from_index({double(i), double(j), double(k)});
+        v[n] = p.x > 4 && p.z > 0.5 ? 7 : p.z < 0 && p.x < 3 ? 3 : 0;
+      }
+  labels.voxels = v;
+  return std::make_shared<const StructureMap>(labels);
+}
+
+// Touched and injured from the face on: a hundredth of a millimetre before it not, a hundredth behind it yes.
+TEST(Structures, AreTouchedAndInjuredFromTheFaceOn) {
+  const auto map = floor_and_wall();
+  for (const bool drill : {false, true}) {
+    auto bone = no_bone();
+    HapticRenderer r(quiet(), bone, {nullptr, nullptr, map}, 1e-3);
+    const std::uint32_t touched = kStructureTouched, all = kStructureTouched | kStructureInjured;
+    for (const double deep : {-0.05, -0.01, 0.01, 0.05, 0.3, 1.0}) {
+      const auto record = r.step(at({0, 0, 2 - deep}, {0, 0, 1}, drill)).record;
+      EXPECT_EQ(record.structure, 3u);
+      EXPECT_NEAR(record.clearance_mm, -deep, 0.002);
+      EXPECT_EQ(record.flags & all, deep < 0 ? 0u : drill ? all : touched) << deep;
+    }
+    const auto e = r.structure_events().at(3);
+    EXPECT_EQ(e.ticks_touched, 4u);
+    EXPECT_EQ(e.ticks_injured, drill ? 4u : 0u);
+    EXPECT_NEAR(e.least_clearance_mm, -1, 0.002);
+  }
+}
+
+// A record names the nearest; the counts are of each, also of one that is touched while another is touched deeper.
+TEST(Structures, SeveralAtOnceAllCount) {
+  auto bone = no_bone();
+  HapticRenderer r(quiet(), bone, {nullptr, nullptr, floor_and_wall()}, 1e-3);
+  const auto there = [&](double x, double z, bool drill, int ticks) {
+    TickRecord record;
+    for (int t = 0; t < ticks; ++t) record = r.step(at({x, 0, z}, {0, 0, 1}, drill)).record;
+    return record;
+  };
+  EXPECT_EQ(there(0.5, 3.0, false, 5).structure, 3u);  // 1 mm above the floor, 1.5 beside the wall
+  EXPECT_EQ(there(2.2, 3.0, false, 5).structure, 7u);  // touches the wall alone
+  EXPECT_EQ(there(2.2, 1.5, true, 7).structure, 3u);   // both, the floor deeper
+  const auto events = r.structure_events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events.at(3).ticks_touched, 7u);
+  EXPECT_EQ(events.at(3).ticks_injured, 7u);
+  EXPECT_EQ(events.at(7).ticks_touched, 12u);
+  EXPECT_EQ(events.at(7).ticks_injured, 7u);
+  EXPECT_NEAR(events.at(7).least_clearance_mm, -0.2, 0.01);
+  EXPECT_NEAR(events.at(3).least_clearance_mm, -0.5, 0.05);
+}
+
+// What never came within reach of the burr's surface is not told of; what only just did, is.
+TEST(Structures, OnlyThoseWithinReachAreListed) {
+  auto bone = no_bone();
+  HapticRenderer r(quiet(), bone, {nullptr, nullptr, floor_and_wall()}, 1e-3);
+  for (const double z : {14.0, 13.0, 12.0}) static_cast<void>(r.step(at({-12, 0, z}, {0, 0, 1}, false)));
+  EXPECT_TRUE(r.structure_events().empty());
+  const auto record = r.step(at({-4.9, 0, 9.9}, {0, 0, 1}, false)).record;
+  EXPECT_EQ(record.structure, 3u);
+  EXPECT_NEAR(record.clearance_mm, 7.9, 0.02);
+  EXPECT_EQ(r.structure_events().size(), 1u);
+}
+
+// A burr that does not turn, or whose hand is held, lost or has just jumped, touches but does not injure.
+TEST(Structures, OnlyATurningBurrInjures) {
+  const auto map = floor_and_wall();
+  const auto pose = at({0, 0, 1.5}, {0, 0, 1}, true);
+  const auto flags = [&](auto&& prepare, HapticSetup setup = quiet()) {
+    auto bone = no_bone();
+    HapticRenderer r(setup, bone, {nullptr, nullptr, map}, 1e-3);
+    for (int t = 0; t < 10; ++t) static_cast<void>(r.step(pose));
+    const auto before = r.structure_events().at(3).ticks_injured;
+    DeviceSample s = pose;
+    prepare(r, s);
+    const auto f = r.step(s).record.flags;
+    EXPECT_NE(f & kStructureTouched, 0u);
+    EXPECT_EQ(r.structure_events().at(3).ticks_injured - before, (f & kStructureInjured) != 0 ? 1u : 0u);
+    return f & kStructureInjured;
+  };
+  EXPECT_NE(flags([](HapticRenderer&, DeviceSample&) {}), 0u);
+  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.drill_on = 0; }), 0u);
+  EXPECT_EQ(flags([](HapticRenderer& r, DeviceSample&) { r.hold(true); }), 0u);
+  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.age_ms = 60; }), 0u);
+  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.position_mm[0] = NAN; }), 0u);
+  EXPECT_EQ(flags([](HapticRenderer& r, DeviceSample& s) {
+              static_cast<void>(r.step(at({0, 0, 60}, {0, 0, 1}, true)));
+              s.position_mm[0] = 0.01F;
+            }),
+            0u);
+  auto still = quiet();
+  still.params.effects.speed_rpm = 0;
+  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample&) {}, still), 0u);
+}
+
+// Where the hand was torn to in one tick nothing is cut, however deep in bone that is; in the next it is.
+TEST(Removal, NothingInTheTickOfAJump) {
+  auto bone = test::slab(0.5);
+  HapticRenderer r(quiet(), bone, {}, 1e-3);
+  for (int t = 0; t < 20; ++t) static_cast<void>(r.step(at({0, 0, 40}, {0, 0, 1}, true)));
+  const auto [jump, none] = r.step(at({0, 0, 1.2}, {0, 0, 1}, true));
+  EXPECT_NE(jump.flags & kPoseJumped, 0u);
+  EXPECT_GT(jump.normal_force_n, 0.5);
+  EXPECT_EQ(none.size(), 0u);
+  EXPECT_EQ(jump.removed_mm3, 0);
+  const auto [next, some] = r.step(at({0, 0, 1.2}, {0, 0, 1}, true));
+  EXPECT_GT(some.size(), 0u);
+  EXPECT_GT(next.removed_mm3, 0);
+}
+
+// Bone cut in two that nobody has opened: the halves share the force, and together lose what the whole would.
+TEST(Removal, BodiesShareTheForce) {
+  const auto drilled = [](bool two, double* force_n) {
+    auto setup = quiet();
+    setup.params.effects.fail_safe = false;
+    auto left = test::slab(0.5), right = test::slab(0.5);
+    for (VoxelKey v = 0; two && v < left.brick_count() * BrickGrid::kVoxels; ++v) {
+      (left.frame().world_from_index({double(left.coordinate(v).i), 0, 0}).x < 0 ? right : left).set(v, 0);
+    }
+    HapticRenderer r(setup, Anatomy{}, 1e-3);
+    HapticScene scene;
+    scene.items.push_back({std::make_shared<TouchedBone>(r.setup(), left, nullptr), {}, {}});
+    if (two) scene.items.push_back({std::make_shared<TouchedBone>(r.setup(), right, nullptr), {}, {}});
+    scene.make_room();
+    r.show(&scene);
+    double removed = 0;
+    *force_n = 0;
+    for (int t = 0; t < 100; ++t) {
+      const auto record = r.step(at({0, 0, 1.6 - 0.002 * t}, {0, 0, 1}, true)).record;
+      removed += static_cast<double>(record.removed_mm3);
+      *force_n += static_cast<double>(record.normal_force_n) / 100;
+    }
+    return removed;
+  };
+  double force_of_one = 0, force_of_two = 0;
+  const double one = drilled(false, &force_of_one), two = drilled(true, &force_of_two);
+  EXPECT_GT(one, 0.2);
+  EXPECT_NEAR(two / one, 1, 0.03);
+  EXPECT_NEAR(force_of_two / force_of_one, 1, 0.03);
 }
 
 }  // namespace

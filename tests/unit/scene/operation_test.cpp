@@ -267,6 +267,60 @@ TEST(Operation, TheBorderOfARegionIsNotFelt) {
   EXPECT_LT(sideways, 0.03 * most);
 }
 
+// Two structures in the bar: the strokes go through one and near the other. What the summary tells follows from the stream alone.
+TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
+  Labels labels;
+  labels.frame.dims = {48, 40, 48};
+  labels.frame.spacing_mm = {0.25, 0.25, 0.25};
+  labels.frame.origin_mm = {-6, -5, -6};
+  const auto v = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  std::size_t n = 0;
+  for (int k = 0; k < 48; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 48; ++i, ++n) {
+        const Vec3 p = labels.frame.world_from_index({double(i), double(j), double(k)});
+        v[n] = std::hypot(p.y, p.z - 3.8) < 0.6 ? 2 : std::hypot(p.x, p.z + 1) < 0.6 ? 9 : 0;
+      }
+  labels.voxels = v;
+  labels.structures = {{2, "nerve", {}}};
+  Anatomy anatomy;
+  anatomy.structures = std::make_shared<const StructureMap>(labels);
+  const test::ScratchFolder scratch;
+  RehearsalOptions options;
+  options.haptics.device = SpringHand::traits();
+  options.haptics.structures = anatomy.structures->hash();
+  options.anatomy = anatomy;
+  options.session_file = scratch / "stream.oss";
+  const World world(test::bar(0.5, 0.2));
+  Rehearsal rehearsal(world.copy(), std::make_unique<ScriptedDevice>(strokes(0, 2), 1000), options, {});
+  const RehearsalSummary s = rehearsal.run_to_end({});
+  const Session session = read_session(options.session_file);
+  // Counted once more from the records, for the nerve: it is always the nearest.
+  StructureEvents nerve{1e9, 0, 0};
+  for (const TickRecord& t : session.ticks) {
+    if (t.structure != 2) continue;
+    nerve.least_clearance_mm = std::min(nerve.least_clearance_mm, static_cast<double>(t.clearance_mm));
+    nerve.ticks_touched += (t.flags & kStructureTouched) != 0 ? 1 : 0;
+    nerve.ticks_injured += (t.flags & kStructureInjured) != 0 ? 1 : 0;
+  }
+  ASSERT_EQ(s.structures.size(), 2u);
+  EXPECT_GT(s.structures.at(2).ticks_injured, 50u);
+  EXPECT_EQ(s.structures.at(2).ticks_touched, nerve.ticks_touched);
+  EXPECT_EQ(s.structures.at(2).ticks_injured, nerve.ticks_injured);
+  EXPECT_NEAR(s.structures.at(2).least_clearance_mm, nerve.least_clearance_mm, 1e-6);
+  EXPECT_EQ(s.structures.at(9).ticks_touched, 0u);
+  EXPECT_GT(s.structures.at(9).least_clearance_mm, 0.2);
+  EXPECT_LT(s.structures.at(9).least_clearance_mm, 5);
+  const ReplayResult again = replay(session, world.copy(), anatomy, {});
+  EXPECT_TRUE(again.identical) << again.difference;
+  ASSERT_EQ(again.structures.size(), 2u);
+  for (const auto& [value, e] : s.structures) {
+    EXPECT_EQ(again.structures.at(value).least_clearance_mm, e.least_clearance_mm);
+    EXPECT_EQ(again.structures.at(value).ticks_touched, e.ticks_touched);
+    EXPECT_EQ(again.structures.at(value).ticks_injured, e.ticks_injured);
+  }
+}
+
 TEST(Operation, APlateRestsOnBone) {
   for (const char* name : {"miniplate-4", "reconstruction-8", "distractor"}) {
     World world(test::bar(0.5, 0.2));

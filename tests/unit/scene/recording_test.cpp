@@ -313,7 +313,7 @@ TEST(Recording, TheSummaryTellsOfEveryReader) {
   EXPECT_EQ(j["ticks_lost_by_readers"], 75);
   EXPECT_EQ(j["ticks_not_recorded"], 70);
   EXPECT_EQ(j["gaps"][0]["first_tick"], 100);
-  EXPECT_EQ(j["ticks_not_watched_near_structures"], 5);
+  EXPECT_EQ(j["ticks_not_followed"], 5);
   fs::remove_all(folder);
 }
 

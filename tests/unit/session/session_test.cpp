@@ -6,6 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/session/haptic_settings.h"
 #include "osteo/session/recorder.h"
 #include "osteo/session/script_file.h"
 #include "osteo/session/session_file.h"
@@ -36,6 +37,49 @@ SessionHeader header() {
   h.rate_hz = 2000;
   h.haptics.params.contact.stiffness_n_per_mm = 1.25;
   return h;
+}
+
+TEST(HapticSettings, HardnessIsAutomaticUnlessSaid) {
+  const auto file = fresh("hardness.json"), law = fresh("law.json");
+  std::ofstream(law) << R"({"osteotome_hardness": 1, "exponent": 2})";
+  const auto loaded = [&](const std::string& settings) {
+    std::ofstream(file) << R"({"osteotome_haptics": 1, )" + settings + "}";
+    HapticSetup setup;
+    load_haptic_settings(file, setup);
+    return setup;
+  };
+  EXPECT_FALSE(HapticSetup{}.hardness.has_value());
+  EXPECT_EQ(loaded(R"("hardness": true)").hardness, true);
+  EXPECT_EQ(loaded(R"("hardness": false)").hardness, false);
+  EXPECT_FALSE(loaded(R"("hardness": "auto")").hardness.has_value());
+  EXPECT_EQ(parse_hardness(loaded("\"hardness_file\": \"" + law.filename().string() + "\"").hardness_json, "").exponent, 2);
+  EXPECT_THROW(loaded(R"("hardness": "yes")"), Error);
+  EXPECT_THROW(loaded(R"("hardness": 1)"), Error);
+  std::ofstream(law) << R"({"osteotome_hardness": 1, "exponent": 20})";
+  EXPECT_THROW(loaded("\"hardness_file\": \"" + law.filename().string() + "\""), Error);
+  // What is printed can be read again, and says the same.
+  for (const std::optional<bool> on : {std::optional<bool>{}, std::optional<bool>{true}, std::optional<bool>{false}}) {
+    HapticSetup setup;
+    setup.hardness = on;
+    std::ofstream(file) << haptic_settings_json(setup);
+    HapticSetup again;
+    again.hardness = false;
+    load_haptic_settings(file, again);
+    EXPECT_EQ(again.hardness, on);
+  }
+  fs::remove(file);
+  fs::remove(law);
+}
+
+TEST(SessionFile, KeepsTheLawOfHardness) {
+  const auto path = fresh("law");
+  SessionHeader h = header();
+  h.haptics.hardness = true;
+  h.haptics.hardness_json = default_hardness_json();
+  { const SessionWriter w(path, h); }
+  EXPECT_EQ(read_session(path).header.haptics.hardness, true);
+  EXPECT_EQ(read_session(path).header.haptics.hardness_json, default_hardness_json());
+  fs::remove(path);
 }
 
 TEST(SessionFile, RoundTrip) {

@@ -2,27 +2,50 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "osteo/base/param.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/grid/brick_grid.h"
 
 namespace osteo {
 
-/// Work to remove a volume relative to dense cortical bone (1500 HU), in proportion to mineral density, which is linear in HU (doi
-/// 10.12989/aba.2013.1.1.015: to 1750 mg/cm3). That the work is in proportion to mineral density is a guess; the thesis has none.
-/// Kept in steps of 1/64, between 1/8 and 3; one byte a voxel.
+/// Energy to remove a volume of bone of some HU over that of dense cortical bone. Form, sources and the built-in constants:
+/// libs/bone/hardness.json.
+struct HardnessLaw {
+  using Params = HardnessLaw;
+  double cortical_hu = 1500, zero_hu = 0, exponent = 1, least = 0.125, most = 3;
+
+  static void describe(HardnessLaw& p, auto& visit) {
+    visit({"cortical_hu", "bone that counts as 1", "HU", 1, 30000}, p.cortical_hu);
+    visit({"zero_hu", "what would resist not at all", "HU", -1024, 29999}, p.zero_hu);
+    visit({"exponent", "of the density between the two", "", 0, 4}, p.exponent);
+    visit({"least", "no bone resists less", "", 0.02, 1}, p.least);
+    visit({"most", "nor more", "", 1, 3.9}, p.most);
+  }
+  [[nodiscard]] double at(double hu) const;
+};
+/// { "osteotome_hardness": 1, "source": "...", and any field of HardnessLaw; what is not named is as built in }. Error(usage), with the line
+/// and key; `name` of the text.
+[[nodiscard]] HardnessLaw parse_hardness(std::string_view json, const std::string& name);
+/// libs/bone/hardness.json.
+[[nodiscard]] std::string_view default_hardness_json();
+
+/// The law of every voxel, in steps of 1/64; one byte a voxel.
 class Hardness {
  public:
-  static constexpr double kCorticalHu = 1500;
   /// From the HU of the case, sampled at the voxels of the bone. Voxels without HU count as cortical.
-  Hardness(const BrickGrid& bone, const SparseGrid& hu);
+  Hardness(const BrickGrid& bone, const SparseGrid& hu, const HardnessLaw& law = {});
   /// Of a piece: its bricks are these of the whole.
   Hardness(const Hardness& whole, std::span<const std::uint32_t> bricks);
   [[nodiscard]] float at(VoxelKey voxel) const { return static_cast<float>(steps_[voxel]) / 64.0F; }
+  [[nodiscard]] const HardnessLaw& law() const { return law_; }
   [[nodiscard]] std::size_t memory_bytes() const { return steps_.size(); }
 
  private:
+  HardnessLaw law_;
   std::vector<std::uint8_t> steps_;
 };
 

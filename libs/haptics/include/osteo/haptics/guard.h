@@ -64,11 +64,12 @@ class PassivityControl {
   bool started_ = false;
 };
 
-/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. No allocation. The same input
-/// gives the same bits.
+/// All limits in one place, in this order: fading and resuming, damping and passivity, force cap, rate cap. The last thing between whatever
+/// went wrong before and a hand. No allocation. The same input gives the same bits.
 class Guard {
  public:
-  Guard(const GuardParams& params, const DeviceTraits& device) : params_(params), device_(device) {}
+  /// A limit that is negative or not a number counts as 0: no force, or none that changes.
+  Guard(const GuardParams& params, const DeviceTraits& device);
 
   struct Input {
     Vec3 position_mm;
@@ -82,7 +83,8 @@ class Guard {
     Vec3 force_n;
     std::uint32_t flags = 0;
   };
-  /// A `dt_s` that is not positive and finite stands for a millisecond.
+  /// Whatever comes in, the force that goes out is finite and within the limits of force and rate. What is not finite counts as none: force,
+  /// normal; a position, as a jump; an age, as stale; a `dt_s` that is not positive and finite stands for a millisecond.
   Output limit(const Input& in, double dt_s) noexcept;
   [[nodiscard]] double energy_mj() const { return passivity_.energy_mj(); }
   [[nodiscard]] Vec3 velocity_mm_s() const { return velocity_; }
@@ -90,6 +92,7 @@ class Guard {
  private:
   GuardParams params_;
   DeviceTraits device_;
+  double most_n_;
   PassivityControl passivity_;
   Vec3 velocity_, last_x_mm_, last_force_n_;
   bool moving_ = false;  // last_x_mm_ is of the tick before

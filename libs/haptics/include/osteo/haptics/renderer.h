@@ -1,5 +1,6 @@
 // Haptic rendering: all that happens to a pose between the device and the hand, but for the device.
 #pragma once
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -10,6 +11,12 @@
 #include "osteo/haptics/vibration.h"
 
 namespace osteo {
+
+/// What the burr's head did near one structure at risk.
+struct StructureEvents {
+  double least_clearance_mm = 0;
+  std::uint64_t ticks_touched = 0, ticks_injured = 0;
+};
 
 /// Pose to force and removal. Owns all buffers but those of the scene. step() neither allocates nor locks nor throws, and the same sequence
 /// of samples and scenes gives the same bits.
@@ -44,6 +51,9 @@ class HapticRenderer {
 
   /// Of the last step, before limits.
   [[nodiscard]] const ContactResult& contact() const { return contact_; }
+  /// By value in the label map: of every structure that ever was within reach, whichever was the nearest. What a record tells is the
+  /// nearest alone. Follows from samples and scenes, so a replay gets the same. Not while another thread steps.
+  [[nodiscard]] std::map<std::uint32_t, StructureEvents> structure_events() const;
   /// What is really used: the asked one, or less for the sake of stability.
   [[nodiscard]] double stiffness_n_per_mm() const { return setup_.params.contact.stiffness_n_per_mm; }
   /// The setup with what stability allows; bodies are made with it.
@@ -60,6 +70,7 @@ class HapticRenderer {
   void shaft(Vec3 at_mm, Vec3 axis, Vec3& elastic, Vec3& torque) noexcept;
   std::span<const VoxelChange> remove(double& removed_mm3) noexcept;
   [[nodiscard]] double thickness(Vec3 at_mm, Vec3 axis) const noexcept;
+  void watch(const RoundCone& head, Vec3 at_mm, Vec3 axis, bool cuts, TickRecord& record) noexcept;
 
   HapticSetup setup_;
   Anatomy anatomy_;
@@ -82,6 +93,8 @@ class HapticRenderer {
   DeviceSample last_good_;
   bool has_last_ = false;
   std::uint32_t flags_ = 0;
+  std::vector<double> clearances_;       // in the order of the structures' values
+  std::vector<StructureEvents> events_;  // the same
 };
 
 }  // namespace osteo

@@ -1,4 +1,4 @@
-// What reads the stream while bone is drilled: surface, pieces, dust, events near structures.
+// What reads the stream while bone is drilled: surface, pieces, dust.
 #pragma once
 #include <deque>
 #include <map>
@@ -17,12 +17,6 @@ struct FollowerParts {
   bool surface = true;
   bool pieces = false;
   bool dust = false;
-};
-
-/// What the burr did near a structure at risk.
-struct StructureEvents {
-  double least_clearance_mm = 0;
-  std::uint64_t ticks_touched = 0, ticks_injured = 0;
 };
 
 /// Keeps up what a scene lists, body by body; the rest is not built. One thread at a time. Everything follows from the stream alone, so a
@@ -58,7 +52,6 @@ class Follower {
 
   [[nodiscard]] const TickRecord& latest() const { return latest_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
-  [[nodiscard]] const std::map<std::uint32_t, StructureEvents>& structure_events() const { return structure_events_; }
 
  private:
   struct Followed {
@@ -117,7 +110,6 @@ class Follower {
   double sawn_mm3_ = 0;
   std::uint64_t next_tick_ = 0, ticks_lost_ = 0;
   std::size_t happened_before_ = 0;  // actions whose turn comes still, and that have happened to the dust while catching up
-  std::map<std::uint32_t, StructureEvents> structure_events_;
 };
 
 }  // namespace osteo

@@ -36,7 +36,7 @@ struct RehearsalSummary {
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
-  std::uint64_t ticks_not_followed = 0;  ///< surface and pieces are right all the same; structures were not watched in these ticks
+  std::uint64_t ticks_not_followed = 0;  ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
   bool interrupted = false;              ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
@@ -137,6 +137,7 @@ struct ReplayResult {
   bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
   std::string difference;  ///< the first one
   std::string bone_hash, surface_hash, dust_hash;
+  std::map<std::uint32_t, StructureEvents> structures;  ///< as the session's summary has them
   std::shared_ptr<const World> world;  ///< as the session left it
   double removed_mm3 = 0;
   double seconds = 0;

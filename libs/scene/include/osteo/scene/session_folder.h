@@ -35,9 +35,17 @@ struct SessionFolder {
 
 /// Settings from `file`, or where that is empty from haptics.json of the case where there is one.
 void apply_haptic_settings(const std::filesystem::path& case_folder, const std::filesystem::path& file, HapticSetup& setup);
-/// What the case knows besides bone, as the setup asks for it; names the structures in the setup. Errors: no_input (hardness asked, no HU).
+/// What the case knows besides bone, as the setup asks for it. Settles in the setup whether removal goes by HU and by which law, and names
+/// the structures. Warns when a case keeps no HU and nothing was asked. Errors: no_input (hardness asked, no HU).
 [[nodiscard]] Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& context);
 
+/// The constants of the law by which bone resists the burr, as summary.json has them, or null: all alike.
+[[nodiscard]] std::string hardness_json(const Anatomy& anatomy);
+/// The same in a sentence, with how to turn it off.
+[[nodiscard]] std::string told_hardness(const Anatomy& anatomy);
+/// What the burr did near each structure at risk, as summary.json lists it: seconds, not ticks; what was never within reach is not there.
+[[nodiscard]] std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map,
+                                          double rate_hz);
 /// Writes summary.json and returns its text.
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& summary, double rate_hz, const std::string& burr,
                           const Anatomy& anatomy = {});
