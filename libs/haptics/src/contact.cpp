@@ -21,9 +21,9 @@ std::size_t most_hits(double spacing_mm) {
 std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm) {
   switch (params.method) {
     case ContactMethod::rays:
-      return std::make_unique<RaySampling>(params);
+      return std::make_unique<RaySampling>(params, spacing_mm);
     case ContactMethod::volume:
-      return std::make_unique<VolumeSampling>(params);
+      return std::make_unique<VolumeSampling>(params, spacing_mm);
     case ContactMethod::proxy:
       return std::make_unique<BurrProxy>(params, spacing_mm);
     default:
@@ -31,12 +31,19 @@ std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, do
   }
 }
 
+Removal::Removal(const BrickGrid& bone)
+    : grains_(bone), reached_(most_hits(bone.frame().spacing_mm.x) + 512), changes_(most_hits(bone.frame().spacing_mm.x)) {}
+
 std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm,
                                              double dt_s, const Hardness* hardness, double& removed_mm3) noexcept {
   removed_mm3 = 0;
   if (cut.hits.empty() || !(cut.weight_mm3 > 0) || !(cut.bone_mm3 > 0) || !(force_n > 0)) return {};
+  grains_.place(bone, burr.head(), cut.at_mm, cut.axis);
   double listed = 0, resisted = 0;
-  for (const Hit& h : cut.hits) {
+  for (std::size_t i = 0; i < cut.hits.size(); ++i) {
+    const Hit& h = cut.hits[i];
+    reached_[i] = bone.value(h.voxel) - grains_.reach(bone, h.voxel);
+    if (!(reached_[i] > 0)) continue;
     const auto w = static_cast<double>(h.weight);
     listed += w;
     resisted += hardness != nullptr ? w / static_cast<double>(hardness->at(h.voxel)) : w;
@@ -47,12 +54,13 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
   const double wanted = full * efficiency * force_n * ease + carry_mm3_;
   const double voxel_mm3 = bone.frame().voxel_volume_mm3();
   std::size_t changed = 0;
-  for (const Hit& h : cut.hits) {
-    if (changed >= changes_.size()) break;
+  for (std::size_t i = 0; i < cut.hits.size() && changed < changes_.size(); ++i) {
+    if (!(reached_[i] > 0)) continue;
+    const Hit& h = cut.hits[i];
     const double ease_here = hardness != nullptr ? 1 / static_cast<double>(hardness->at(h.voxel)) : 1;
     const double share = wanted * static_cast<double>(h.weight) * ease_here / resisted / voxel_mm3;
     const float before = bone.value(h.voxel);
-    const float after = std::max(0.0F, before - static_cast<float>(share));
+    const float after = std::max(0.0F, before - std::min(reached_[i], static_cast<float>(share)));
     if (after == before) continue;
     bone.set(h.voxel, after);
     changes_[changed++] = {h.voxel, after};

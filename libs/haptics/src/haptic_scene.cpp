@@ -12,7 +12,7 @@ TouchedBone::TouchedBone(const HapticSetup& setup, std::shared_ptr<Body> body) :
 }
 
 TouchedBone::TouchedBone(const HapticSetup& setup, BrickGrid& bone, std::shared_ptr<const Hardness> hardness)
-    : bone_(bone), hardness_(std::move(hardness)), removal_(most_hits(bone.frame().spacing_mm.x)) {
+    : bone_(bone), hardness_(std::move(hardness)), removal_(bone) {
   const double spacing = bone.frame().spacing_mm.x;
   const HapticsParams& params = setup.params;
   method_of_tool_.assign(burr_library().size(), params.contact.method);

@@ -188,5 +188,66 @@ inline void run_brick(const Shape& shape, const float* values, const float* firs
   }
 }
 
+// Clears the bits of points where `gone` holds; eight points at a time, bit g of lane l is point 8 g + l. A set of 64 has eight bits a lane.
+template <class Gone>
+inline std::uint32_t sift(const GrainPoints& points, std::uint64_t* left, Gone gone) {
+  std::uint32_t count = 0;
+  const std::uint32_t groups = points.count / 8;
+  for (std::uint32_t first = 0; first < groups; first += 32) {
+    M set{};
+    for (std::uint32_t g = first; g < first + 32 && g < groups; ++g) {
+      F x, y, z;
+      std::memcpy(&x, points.x + g * 8, sizeof x);
+      std::memcpy(&y, points.y + g * 8, sizeof y);
+      std::memcpy(&z, points.z + g * 8, sizeof z);
+      const std::int32_t bit = static_cast<std::int32_t>(1U << (g % 32));
+      set |= gone(x, y, z) & M{bit, bit, bit, bit, bit, bit, bit, bit};
+    }
+    std::uint64_t words[4];
+    std::memcpy(words, &set, sizeof words);
+    if (groups == 8) {
+      std::uint64_t packed = 0;
+      for (int l = 0; l < 8; ++l) packed |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(set[l])) << (8 * l);
+      words[0] = packed;
+    }
+    for (std::uint32_t w = 0; w < (groups == 8 ? 1U : 4U); ++w) {
+      std::uint64_t& kept = left[first / 8 + w];
+      kept &= ~words[w];
+      count += static_cast<std::uint32_t>(__builtin_popcountll(kept));
+    }
+  }
+  return count;
+}
+
+inline std::uint32_t take_grains(const Shape& shape, const float* at, const GrainPoints& points, std::uint64_t* left) {
+  const F cx = all(at[0]), cy = all(at[1]), cz = all(at[2]);
+  if (shape.ball) {
+    const F r2 = all(shape.start_radius * shape.start_radius);
+    return sift(points, left, [&](F x, F y, F z) {
+      x += cx;
+      y += cy;
+      z += cz;
+      return (x * x + y * y) + z * z < r2;
+    });
+  }
+  const F ax = all(shape.axis[0]), ay = all(shape.axis[1]), az = all(shape.axis[2]), length = all(shape.length);
+  const F start = all(shape.start_radius), slope = all(shape.slope), run = all(shape.slope_run);
+  const bool tapers = shape.slope != 0;
+  return sift(points, left, [&](F x, F y, F z) {
+    x += cx;
+    y += cy;
+    z += cz;
+    const F along = x * ax + y * ay + z * az, q2 = (x * x + y * y) + z * z;
+    const F foot = tapers ? along - root(most(q2 - along * along, all(0))) * run : along;
+    const F t = least(most(foot, all(0)), length), r = start - slope * t;
+    return q2 - all(2) * t * along + t * t < r * r;
+  });
+}
+
+inline std::uint32_t grains_beyond(const float* inwards, float least_dot, const GrainPoints& points, std::uint64_t* left) {
+  const F nx = all(inwards[0]), ny = all(inwards[1]), nz = all(inwards[2]), level = all(least_dot);
+  return sift(points, left, [&](F x, F y, F z) { return (x * nx + y * ny) + z * nz < level; });
+}
+
 }  // namespace
 }  // namespace osteo::overlap

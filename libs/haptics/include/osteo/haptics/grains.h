@@ -1,0 +1,65 @@
+// Which part of each voxel the burr has reached.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "osteo/bone/round_cone.h"
+#include "osteo/grid/brick_grid.h"
+
+namespace osteo {
+
+/// Bone goes only where the burr has been. The bone of a voxel that the burr covers in part is kept as grains, points spread evenly through
+/// it, which are lost for good once the burr has covered them, whenever that was: what is left of them is what the voxel's density may not
+/// fall below. Where bone fills a voxel in part, the grains lie on the inner side of the plane that its neighbours tell of (as they were
+/// before any drilling) and that leaves as much bone. Voxels that the burr has covered whole need a bit each, those that it has not
+/// touched nothing but a byte for what they were.
+/// 512 grains a voxel from 0.35 mm on, 64 below: a plane through a voxel is known to about 1/100 and 1/30 of its edge, without bias.
+/// Memory: 1.13 bytes a voxel of the bone, and 72 bytes (64 grains: 16) for each voxel in room(). All of it is made at once; the rest
+/// neither allocates nor locks.
+class Grains {
+ public:
+  /// `bone` as nobody has drilled it yet; as large as it is when used.
+  explicit Grains(const BrickGrid& bone);
+
+  /// The burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame.
+  void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis) noexcept;
+  /// Takes what the burr covers of a voxel where it is placed, and tells how much bone is left that it never covered: density cannot fall
+  /// below. Cost: 5 ns where it covers the voxel whole, else 0.02 (64 grains) to 0.1 us, twice that for tapers.
+  [[nodiscard]] float reach(const BrickGrid& bone, VoxelKey voxel) noexcept;
+
+  /// How many voxels can be covered in part at a time; the next ones stay as they are until the burr covers them whole.
+  [[nodiscard]] std::size_t room() const { return slots_.size() / 2; }
+  [[nodiscard]] std::size_t used() const { return used_; }
+  /// A voxel was left whole for want of room since this was last asked.
+  [[nodiscard]] bool overflowed() noexcept {
+    const bool was = overflowed_;
+    overflowed_ = false;
+    return was;
+  }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Slot {
+    VoxelKey voxel = BrickGrid::kNone;
+    float grain = 0;  // density of one
+  };
+  [[nodiscard]] std::size_t home(VoxelKey voxel) const noexcept;
+  std::size_t find(VoxelKey voxel) const noexcept;  // its slot, or the free one where it would be
+  void erase(std::size_t slot) noexcept;
+  void fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexcept;
+
+  std::vector<std::uint8_t> before_;    // density in 1/255 before any drilling
+  std::vector<std::uint64_t> covered_;  // whole voxels, a bit each
+  std::vector<Slot> slots_;             // open addressing, at most half full
+  std::vector<std::uint64_t> left_;     // words_ to each slot: its grains
+  std::size_t words_ = 1, used_ = 0;
+  bool overflowed_ = false;
+  // The burr in voxels, as the kernel has it; its axis starts at start_.
+  struct Head {
+    float axis[3] = {}, length = 0, start_radius = 0, slope = 0, slope_run = 0;
+    bool ball = true;
+  } head_;
+  Vec3 start_;
+};
+
+}  // namespace osteo

@@ -1,0 +1,158 @@
+#include "osteo/haptics/grains.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "overlap_kernel.h"
+
+namespace osteo {
+namespace {
+
+// Half a voxel's diagonal: a voxel whose middle is deeper inside a shape than this is inside.
+constexpr float kHalfDiagonal = 0.8661F;
+constexpr double kFineMm = 0.35;
+
+// Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the normal's parts `m`, which
+// sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), equation 3, as a sum over corners.
+double share_below(double alpha, const double (&m)[3]) {
+  const auto cube = [](double x) { return x > 0 ? x * x * x : 0; };
+  return (cube(alpha) - cube(alpha - m[0]) - cube(alpha - m[1]) - cube(alpha - m[2]) + cube(alpha - m[0] - m[1]) +
+          cube(alpha - m[0] - m[2]) + cube(alpha - m[1] - m[2])) /
+         (6 * m[0] * m[1] * m[2]);
+}
+
+}  // namespace
+
+Grains::Grains(const BrickGrid& bone) {
+  const std::size_t voxels = bone.brick_count() * BrickGrid::kVoxels;
+  const bool fine = bone.frame().spacing_mm.x < kFineMm;
+  words_ = fine ? 1 : 8;
+  static_cast<void>(overlap::grain_points(words_));  // not in the servo
+  before_.resize(voxels);
+  for (std::size_t v = 0; v < voxels; ++v)
+    before_[v] = static_cast<std::uint8_t>(std::clamp(bone.value(static_cast<VoxelKey>(v)), 0.0F, 1.0F) * 255 + 0.5F);
+  covered_.resize((voxels + 63) / 64);
+  // Twice as much as the burr's traces over 100 cm2 of bone need, or as a small piece has voxels.
+  slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, std::size_t{fine ? 1U << 20 : 1U << 18}));
+  left_.resize(slots_.size() * words_);
+}
+
+std::size_t Grains::memory_bytes() const {
+  return before_.size() + covered_.size() * sizeof covered_[0] + slots_.size() * sizeof slots_[0] + left_.size() * sizeof left_[0];
+}
+
+// Rows of voxels stay together.
+std::size_t Grains::home(VoxelKey voxel) const noexcept {
+  const std::uint32_t rows = static_cast<std::uint32_t>(slots_.size() / 8);
+  return (((voxel >> 3) * 2654435761U) >> (32 - std::bit_width(rows - 1))) * 8 + (voxel & 7);
+}
+
+std::size_t Grains::find(VoxelKey voxel) const noexcept {
+  std::size_t s = home(voxel);
+  while (slots_[s].voxel != BrickGrid::kNone && slots_[s].voxel != voxel) s = (s + 1) & (slots_.size() - 1);
+  return s;
+}
+
+// What follows moves up, so that every slot is found from its home without a gap.
+void Grains::erase(std::size_t slot) noexcept {
+  const std::size_t last = slots_.size() - 1;
+  for (std::size_t next = (slot + 1) & last; slots_[next].voxel != BrickGrid::kNone; next = (next + 1) & last) {
+    const std::size_t wanted = home(slots_[next].voxel);
+    if (((next - wanted) & last) < ((next - slot) & last)) continue;
+    slots_[slot] = slots_[next];
+    std::copy_n(&left_[next * words_], words_, &left_[slot * words_]);
+    slot = next;
+  }
+  slots_[slot] = {};
+  --used_;
+}
+
+void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis) noexcept {
+  const Frame& frame = bone.frame();
+  const double h = frame.spacing_mm.x, b = head.slope();
+  start_ = frame.index_from_world(start_mm + axis * head.start_mm);
+  const Vec3 along = transposed(frame.direction) * axis;
+  for (std::size_t a = 0; a < 3; ++a) head_.axis[a] = static_cast<float>(along[a]);
+  head_.length = static_cast<float>(head.length_mm / h);
+  head_.start_radius = static_cast<float>(head.start_radius_mm / h);
+  head_.slope = static_cast<float>(b);
+  head_.slope_run = static_cast<float>(b / std::sqrt(1 - b * b));
+  head_.ball = head.length_mm == 0;
+}
+
+// All grains that the voxel's bone has.
+void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexcept {
+  const overlap::GrainPoints& points = overlap::grain_points(words_);
+  std::uint64_t* const left = &left_[slot * words_];
+  const auto density = static_cast<double>(bone.value(voxel));
+  std::fill_n(left, words_, ~std::uint64_t{0});
+  slots_[slot] = {voxel, static_cast<float>(density / points.count)};
+  if (density >= 1) return;
+  // The slope of density by what the 26 neighbours were.
+  int slope[3] = {};
+  const Ijk c = bone.coordinate(voxel);
+  const std::uint32_t place = voxel % BrickGrid::kVoxels;
+  const bool inner = (place & 7) - 1 < 6U && (place >> 3 & 7) - 1 < 6U && (place >> 6) - 1 < 6U;
+  for (int n = 0; n < 27; ++n) {
+    const int d[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+    const VoxelKey neighbour = inner ? voxel + static_cast<VoxelKey>(d[0] + 8 * d[1] + 64 * d[2]) : bone.find(c.i + d[0], c.j + d[1], c.k + d[2]);
+    const int value = neighbour == BrickGrid::kNone ? 0 : before_[neighbour];
+    for (int a = 0; a < 3; ++a) slope[a] += d[a] * value * (2 >> (d[(a + 1) % 3] & 1)) * (2 >> (d[(a + 2) % 3] & 1));
+  }
+  double size[3], sum = 0;
+  for (int a = 0; a < 3; ++a) {
+    size[a] = std::max(std::abs(static_cast<double>(slope[a])), 1e-3);
+    sum += size[a];
+  }
+  if (sum < 160) return;  // no plane to speak of: bone all through the voxel
+  for (double& m : size) m /= sum;
+  double lo = 0, hi = 1;
+  for (int i = 0; i < 16; ++i) {
+    const double alpha = 0.5 * (lo + hi);
+    (share_below(alpha, size) < density ? lo : hi) = alpha;
+  }
+  const float inwards[3] = {static_cast<float>(slope[0]), static_cast<float>(slope[1]), static_cast<float>(slope[2])};
+  const std::uint32_t count = overlap::grain_functions().plane(inwards, static_cast<float>((0.5 - lo) * sum), points, left);
+  if (count == 0) {
+    std::fill_n(left, words_, ~std::uint64_t{0});
+  } else {
+    slots_[slot].grain = static_cast<float>(density / count);
+  }
+}
+
+float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
+  std::uint64_t& bits = covered_[voxel / 64];
+  const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
+  if ((bits & bit) != 0) return 0;
+  const Ijk c = bone.coordinate(voxel);
+  const float at[3] = {static_cast<float>(c.i - start_.x), static_cast<float>(c.j - start_.y), static_cast<float>(c.k - start_.z)};
+  const float along = at[0] * head_.axis[0] + at[1] * head_.axis[1] + at[2] * head_.axis[2];
+  const float q2 = at[0] * at[0] + at[1] * at[1] + at[2] * at[2];
+  const float off = head_.slope_run == 0 ? 0 : std::sqrt(std::max(q2 - along * along, 0.0F));
+  const float t = std::clamp(along - off * head_.slope_run, 0.0F, head_.length);
+  const float distance = std::sqrt(std::max(q2 - 2 * t * along + t * t, 0.0F)) - (head_.start_radius - head_.slope * t);
+  const std::size_t slot = find(voxel);
+  const bool known = slots_[slot].voxel == voxel;
+  if (distance > kHalfDiagonal && !known) return bone.value(voxel);
+  if (distance > -kHalfDiagonal) {
+    if (!known) {
+      if (used_ >= room()) {
+        overflowed_ = true;
+        return bone.value(voxel);
+      }
+      fill(bone, voxel, slot);
+      ++used_;
+    }
+    overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
+    const std::uint32_t left = overlap::grain_functions().take(shape, at, overlap::grain_points(words_), &left_[slot * words_]);
+    if (left > 0) return static_cast<float>(left) * slots_[slot].grain;
+    erase(slot);
+  } else if (known) {
+    erase(slot);
+  }
+  bits |= bit;
+  return 0;
+}
+
+}  // namespace osteo
