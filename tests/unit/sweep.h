@@ -86,7 +86,7 @@ struct Path {
 };
 
 /// Volume of bone that the burr is in anywhere on its path: poses 0.02 mm apart, and points of a lattice of rank 1 in the box around them.
-inline double swept_mm3(const Path& path, const Face& face, int points = 40000) {
+inline double swept_mm3(const Path& path, const Face& face, int points = 200000) {
   const RoundCone head = burr_library()[static_cast<std::size_t>(path.tool)].head();
   const Vec3 axis = normalized(path.axis);
   std::vector<Vec3> poses{path.from_mm};

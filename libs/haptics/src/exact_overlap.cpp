@@ -132,11 +132,14 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
       return c;
     }
     c.normal = there.area_mm2 * (-1 / pressed);
-    const double cosine = -dot(c.normal, axis_), depth = depths(there.sharp_mm3, cosine);
+    const double cosine = -dot(c.normal, axis_), flat_depth = depths(there.sharp_mm3, cosine);
+    // In a hollow of the burr's own shape there is more surface for the same volume than on flat bone, where the depth is twice the mean
+    // thickness of what lies in the shell: there it goes by that thickness.
+    const double hollow = 3 / std::max(there.surface_mm2, 1e-9), depth = std::min(flat_depth, hollow * there.sharp_mm3);
     c.value_mm = shell - depth;
-    // In a hollow of the burr's own shape the volume grows faster than in flat bone: the step out is then the shorter.
-    const double flat = depths.area_mm2(there.sharp_mm3, cosine);
-    c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(pressed / flat, 0.5, 50.0) : 1.0);
+    // And it grows faster: the step out is then the shorter.
+    const double slope = depth < flat_depth ? hollow * pressed : pressed / depths.area_mm2(there.sharp_mm3, cosine);
+    c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(slope, 0.5, 50.0) : 1.0);
     return c;
   };
   GodObjectParams g;
@@ -162,7 +165,7 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(there.bone_mm3 / bone.frame().voxel_volume_mm3())));
   cutting_ = pose.drill_on != 0 && r.normal_force_n > 0;
   // The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks.
-  advance_mm_ = answer.proxy_mm - offset * std::min(1.0, 0.5 * spacing_mm_ / r.depth_mm);
+  advance_mm_ = answer.proxy_mm - offset * std::min(1.0, 0.75 * spacing_mm_ / r.depth_mm);
   return r;
 }
 

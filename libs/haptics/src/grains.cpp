@@ -11,7 +11,10 @@ namespace {
 
 // Half a voxel's diagonal: a voxel whose middle is deeper inside a shape than this is inside.
 constexpr float kHalfDiagonal = 0.8661F;
-constexpr double kFineMm = 0.35;
+// Grains lie 0.05 to 0.07 mm apart: 64 of them in voxels below the first edge, 512 below the second, 4096 above.
+constexpr double kFineMm = 0.28, kCoarseMm = 0.56;
+// Counted in grains, a sweep is known to a percent at worst: the burr counts as a little smaller, so that it errs on the side of bone.
+constexpr double kSpareMm = 0.0015;
 
 // Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the normal's parts `m`, which
 // sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), equation 3, as a sum over corners.
@@ -26,15 +29,15 @@ double share_below(double alpha, const double (&m)[3]) {
 
 Grains::Grains(const BrickGrid& bone) {
   const std::size_t voxels = bone.brick_count() * BrickGrid::kVoxels;
-  const bool fine = bone.frame().spacing_mm.x < kFineMm;
-  words_ = fine ? 1 : 8;
-  static_cast<void>(overlap::grain_points(words_));  // not in the servo
+  const double h = bone.frame().spacing_mm.x;
+  parts_ = h < kFineMm ? 1 : h < kCoarseMm ? 2 : 4;
+  words_ = parts_ * parts_ * parts_;
   before_.resize(voxels);
   for (std::size_t v = 0; v < voxels; ++v)
     before_[v] = static_cast<std::uint8_t>(std::clamp(bone.value(static_cast<VoxelKey>(v)), 0.0F, 1.0F) * 255 + 0.5F);
   covered_.resize((voxels + 63) / 64);
-  // Twice as much as the burr's traces over 100 cm2 of bone need, or as a small piece has voxels.
-  slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, std::size_t{fine ? 1U << 20 : 1U << 18}));
+  // Twice as much as the burr's traces over 80 cm2 of bone need, or as a small piece has voxels.
+  slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, (std::size_t{1} << 21) >> (parts_ == 1 ? 1 : parts_ == 2 ? 3 : 6)));
   left_.resize(slots_.size() * words_);
 }
 
@@ -75,7 +78,7 @@ void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, 
   const Vec3 along = transposed(frame.direction) * axis;
   for (std::size_t a = 0; a < 3; ++a) head_.axis[a] = static_cast<float>(along[a]);
   head_.length = static_cast<float>(head.length_mm / h);
-  head_.start_radius = static_cast<float>(head.start_radius_mm / h);
+  head_.start_radius = static_cast<float>((head.start_radius_mm - kSpareMm) / h);
   head_.slope = static_cast<float>(b);
   head_.slope_run = static_cast<float>(b / std::sqrt(1 - b * b));
   head_.ball = head.length_mm == 0;
@@ -83,11 +86,10 @@ void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, 
 
 // All grains that the voxel's bone has.
 void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexcept {
-  const overlap::GrainPoints& points = overlap::grain_points(words_);
   std::uint64_t* const left = &left_[slot * words_];
   const auto density = static_cast<double>(bone.value(voxel));
   std::fill_n(left, words_, ~std::uint64_t{0});
-  slots_[slot] = {voxel, static_cast<float>(density / points.count)};
+  slots_[slot] = {voxel, static_cast<float>(density / static_cast<double>(64 * words_))};
   if (density >= 1) return;
   // The slope of density by what the 26 neighbours were.
   int slope[3] = {};
@@ -113,7 +115,7 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
     (share_below(alpha, size) < density ? lo : hi) = alpha;
   }
   const float inwards[3] = {static_cast<float>(slope[0]), static_cast<float>(slope[1]), static_cast<float>(slope[2])};
-  const std::uint32_t count = overlap::grain_functions().plane(inwards, static_cast<float>((0.5 - lo) * sum), points, left);
+  const std::uint32_t count = overlap::grain_functions().plane(inwards, static_cast<float>((0.5 - lo) * sum), parts_, left);
   if (count == 0) {
     std::fill_n(left, words_, ~std::uint64_t{0});
   } else {
@@ -145,7 +147,7 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
       ++used_;
     }
     overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
-    const std::uint32_t left = overlap::grain_functions().take(shape, at, overlap::grain_points(words_), &left_[slot * words_]);
+    const std::uint32_t left = overlap::grain_functions().take(shape, at, parts_, &left_[slot * words_]);
     if (left > 0) return static_cast<float>(left) * slots_[slot].grain;
     erase(slot);
   } else if (known) {

@@ -32,23 +32,6 @@ const GrainFunctions& grain_functions() {
   return kGrainsBase;
 }
 
-const GrainPoints& grain_points(std::size_t words) {
-  // Generators whose lattice has the longest shortest dual vector: planes of any direction are about as far apart.
-  static const auto make = [](std::uint32_t count, std::uint32_t a, std::uint32_t b) {
-    GrainPoints p;
-    p.count = count;
-    const auto at = [&](std::uint32_t n) { return (static_cast<float>(n % count) + 0.5F) / static_cast<float>(count) - 0.5F; };
-    for (std::uint32_t n = 0; n < count; ++n) {
-      p.x[n] = at(n);
-      p.y[n] = at(n * a);
-      p.z[n] = at(n * b);
-    }
-    return p;
-  };
-  static const GrainPoints fine = make(64, 5, 13), coarse = make(512, 9, 143);
-  return words == 1 ? fine : coarse;
-}
-
 }  // namespace overlap
 
 namespace {

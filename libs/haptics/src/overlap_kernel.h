@@ -54,20 +54,13 @@ void brick_avx512(const Shape&, const float*, const float*, VoxelKey, Sums&, Hit
 /// The widest that this machine has, or what OSTEO_SIMD names; all give the same bits.
 BrickFunction brick_function();
 
-/// Points of a voxel, from its middle, in voxels: a lattice of rank 1, so that a plane along an axis never meets more than one at once.
-struct GrainPoints {
-  std::uint32_t count;  // 512 or 64
-  alignas(64) float x[512], y[512], z[512];
-};
-/// For sets of 1 or 8 words.
-const GrainPoints& grain_points(std::size_t words);
-
-/// Both leave of a set of points, a bit each, those that ..., and tell how many those are.
+/// A voxel's grains: parts^3 cubes, x fastest, of 64 points each, one word of bits a cube.
+/// Both functions leave of a set those points that ..., and tell how many those are.
 struct GrainFunctions {
   /// ... the shape does not cover. `at`: the voxel's middle minus the start of the axis.
-  std::uint32_t (*take)(const Shape& shape, const float* at, const GrainPoints& points, std::uint64_t* left);
-  /// ... lie beyond a plane: dot(inwards, x) >= least.
-  std::uint32_t (*plane)(const float* inwards, float least, const GrainPoints& points, std::uint64_t* left);
+  std::uint32_t (*take)(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left);
+  /// ... lie beyond a plane: dot(inwards, x) >= least, x from the voxel's middle.
+  std::uint32_t (*plane)(const float* inwards, float least, std::uint32_t parts, std::uint64_t* left);
 };
 extern const GrainFunctions kGrainsBase, kGrainsAvx2, kGrainsAvx512;
 /// As brick_function() chooses.

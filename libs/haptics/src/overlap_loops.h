@@ -188,65 +188,108 @@ inline void run_brick(const Shape& shape, const float* values, const float* firs
   }
 }
 
-// Clears the bits of points where `gone` holds; eight points at a time, bit g of lane l is point 8 g + l. A set of 64 has eight bits a lane.
-template <class Gone>
-inline std::uint32_t sift(const GrainPoints& points, std::uint64_t* left, Gone gone) {
+// 64 points of a unit cube, from its middle: a lattice of rank 1 with the generators of the longest shortest dual vector, so that planes of
+// points are close together whichever way they face, and along an axis no two points are level.
+struct Lattice {
+  float x[64], y[64], z[64];
+};
+constexpr Lattice lattice() {
+  Lattice l{};
+  for (unsigned n = 0; n < 64; ++n) {
+    l.x[n] = (static_cast<float>(n) + 0.5F) / 64 - 0.5F;
+    l.y[n] = (static_cast<float>(n * 5 % 64) + 0.5F) / 64 - 0.5F;
+    l.z[n] = (static_cast<float>(n * 13 % 64) + 0.5F) / 64 - 0.5F;
+  }
+  return l;
+}
+inline constexpr Lattice kLattice = lattice();
+
+// Clears the bits of points that lie `inside` what takes them; `depth`: how far inside. Cubes that are in or out as a whole are told by
+// their middle.
+template <class Depth, class Inside>
+inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float* at, Depth depth, Inside inside) {
+  const float edge = 1.0F / static_cast<float>(parts), half_diagonal = 0.8661F * edge, first = 0.5F * edge - 0.5F;
+  const std::uint32_t cubes = parts * parts * parts;
   std::uint32_t count = 0;
-  const std::uint32_t groups = points.count / 8;
-  for (std::uint32_t first = 0; first < groups; first += 32) {
-    M set{};
-    for (std::uint32_t g = first; g < first + 32 && g < groups; ++g) {
-      F x, y, z;
-      std::memcpy(&x, points.x + g * 8, sizeof x);
-      std::memcpy(&y, points.y + g * 8, sizeof y);
-      std::memcpy(&z, points.z + g * 8, sizeof z);
-      const std::int32_t bit = static_cast<std::int32_t>(1U << (g % 32));
-      set |= gone(x, y, z) & M{bit, bit, bit, bit, bit, bit, bit, bit};
+  for (std::uint32_t eight = 0; eight < cubes; eight += 8) {
+    F cx{}, cy{}, cz{}, deep{};
+    const std::uint32_t n = cubes < 8 ? cubes : 8;
+    for (std::uint32_t l = 0; l < n; ++l) {
+      const std::uint32_t c = eight + l;
+      cx[l] = at[0] + first + edge * static_cast<float>(c % parts);
+      cy[l] = at[1] + first + edge * static_cast<float>(c / parts % parts);
+      cz[l] = at[2] + first + edge * static_cast<float>(c / (parts * parts));
     }
-    std::uint64_t words[4];
-    std::memcpy(words, &set, sizeof words);
-    if (groups == 8) {
-      std::uint64_t packed = 0;
-      for (int l = 0; l < 8; ++l) packed |= static_cast<std::uint64_t>(static_cast<std::uint32_t>(set[l])) << (8 * l);
-      words[0] = packed;
-    }
-    for (std::uint32_t w = 0; w < (groups == 8 ? 1U : 4U); ++w) {
-      std::uint64_t& kept = left[first / 8 + w];
-      kept &= ~words[w];
+    if (parts > 1) deep = depth(cx, cy, cz);
+    for (std::uint32_t l = 0; l < n; ++l) {
+      std::uint64_t& kept = left[eight + l];
+      if (kept == 0) continue;
+      if (deep[l] > half_diagonal) {
+        kept = 0;
+        continue;
+      }
+      if (deep[l] >= -half_diagonal) {
+        const F mx = all(cx[l]), my = all(cy[l]), mz = all(cz[l]), scale = all(edge);
+        M set{};
+        for (std::int32_t g = 0; g < 8; ++g) {
+          F x, y, z;
+          std::memcpy(&x, kLattice.x + 8 * g, sizeof x);
+          std::memcpy(&y, kLattice.y + 8 * g, sizeof y);
+          std::memcpy(&z, kLattice.z + 8 * g, sizeof z);
+          const std::int32_t bit = 1 << g;
+          set |= inside(mx + scale * x, my + scale * y, mz + scale * z) & M{bit, bit, bit, bit, bit, bit, bit, bit};
+        }
+        using B = std::uint8_t __attribute__((vector_size(8)));
+        const B bytes = __builtin_convertvector(set, B);
+        std::uint64_t gone;
+        std::memcpy(&gone, &bytes, sizeof gone);
+        kept &= ~gone;
+      }
       count += static_cast<std::uint32_t>(__builtin_popcountll(kept));
     }
   }
   return count;
 }
 
-inline std::uint32_t take_grains(const Shape& shape, const float* at, const GrainPoints& points, std::uint64_t* left) {
-  const F cx = all(at[0]), cy = all(at[1]), cz = all(at[2]);
+inline std::uint32_t take_grains(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left) {
+  const F start = all(shape.start_radius);
   if (shape.ball) {
-    const F r2 = all(shape.start_radius * shape.start_radius);
-    return sift(points, left, [&](F x, F y, F z) {
-      x += cx;
-      y += cy;
-      z += cz;
-      return (x * x + y * y) + z * z < r2;
-    });
+    const F r2 = start * start;
+    return sift(
+        parts, left, at, [&](F x, F y, F z) { return start - root(x * x + y * y + z * z); },
+        [&](F x, F y, F z) { return x * x + y * y + z * z < r2; });
   }
   const F ax = all(shape.axis[0]), ay = all(shape.axis[1]), az = all(shape.axis[2]), length = all(shape.length);
-  const F start = all(shape.start_radius), slope = all(shape.slope), run = all(shape.slope_run);
+  const F slope = all(shape.slope), run = all(shape.slope_run);
   const bool tapers = shape.slope != 0;
-  return sift(points, left, [&](F x, F y, F z) {
-    x += cx;
-    y += cy;
-    z += cz;
-    const F along = x * ax + y * ay + z * az, q2 = (x * x + y * y) + z * z;
-    const F foot = tapers ? along - root(most(q2 - along * along, all(0))) * run : along;
-    const F t = least(most(foot, all(0)), length), r = start - slope * t;
-    return q2 - all(2) * t * along + t * t < r * r;
-  });
+  // The square of the distance from the axis' foot, and the radius there.
+  const auto foot = [&](F x, F y, F z, F& r) {
+    const F along = x * ax + y * ay + z * az, q2 = x * x + y * y + z * z;
+    const F t = least(most(tapers ? along - root(most(q2 - along * along, all(0))) * run : along, all(0)), length);
+    r = start - slope * t;
+    return q2 - all(2) * t * along + t * t;
+  };
+  return sift(
+      parts, left, at,
+      [&](F x, F y, F z) {
+        F r;
+        const F d2 = foot(x, y, z, r);
+        return r - root(most(d2, all(0)));
+      },
+      [&](F x, F y, F z) {
+        F r;
+        const F d2 = foot(x, y, z, r);
+        return d2 < r * r;
+      });
 }
 
-inline std::uint32_t grains_beyond(const float* inwards, float least_dot, const GrainPoints& points, std::uint64_t* left) {
+inline std::uint32_t grains_beyond(const float* inwards, float least_dot, std::uint32_t parts, std::uint64_t* left) {
   const F nx = all(inwards[0]), ny = all(inwards[1]), nz = all(inwards[2]), level = all(least_dot);
-  return sift(points, left, [&](F x, F y, F z) { return (x * nx + y * ny) + z * nz < level; });
+  const F inverse = all(1) / root(nx * nx + ny * ny + nz * nz);
+  const float middle[3] = {};
+  return sift(
+      parts, left, middle, [&](F x, F y, F z) { return (level - (x * nx + y * ny + z * nz)) * inverse; },
+      [&](F x, F y, F z) { return x * nx + y * ny + z * nz < level; });
 }
 
 }  // namespace
