@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "osteo/haptics/device.h"
@@ -85,7 +86,8 @@ struct Path {
   }
 };
 
-/// Volume of bone that the burr is in anywhere on its path: poses 0.02 mm apart, and points of a lattice of rank 1 in the box around them.
+/// Volume of bone that the burr is in anywhere on its path: poses 0.02 mm apart, and points spread evenly through
+/// the box around them.
 inline double swept_mm3(const Path& path, const Face& face, int points = 200000) {
   const RoundCone head = burr_library()[static_cast<std::size_t>(path.tool)].head();
   const Vec3 axis = normalized(path.axis);
@@ -114,10 +116,10 @@ inline double swept_mm3(const Path& path, const Face& face, int points = 200000)
   if (poses.empty() || !(hi.z > lo.z)) return 0;
   int inside = 0;
   for (int n = 0; n < points; ++n) {
-    // R. D. Roberts' sequence: powers of the root of x^4 = x + 1.
+    // Multiples of roots that are no multiples of each other: spread evenly in all three.
     const auto part = [&](double a) { return (0.5 + a * n) - std::floor(0.5 + a * n); };
-    const Vec3 p{lo.x + (hi.x - lo.x) * part(0.8191725133961645), lo.y + (hi.y - lo.y) * part(0.6710436067037893),
-                 lo.z + (hi.z - lo.z) * part(0.5497004779019703)};
+    const Vec3 p{lo.x + (hi.x - lo.x) * part(std::numbers::sqrt2), lo.y + (hi.y - lo.y) * part(2.6457513110645906),
+                 lo.z + (hi.z - lo.z) * part(3.3166247903554)};
     if (!(dot(face.normal, p) < face.at_mm)) continue;
     for (const Vec3& x : poses) {
       const Vec3 q = p - x;

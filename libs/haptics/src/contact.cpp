@@ -38,7 +38,7 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
                                              double dt_s, const Hardness* hardness, double& removed_mm3) noexcept {
   removed_mm3 = 0;
   if (cut.hits.empty() || !(cut.weight_mm3 > 0) || !(cut.bone_mm3 > 0) || !(force_n > 0)) return {};
-  grains_.place(bone, burr.head(), cut.at_mm, cut.axis);
+  grains_.place(bone, burr.head(), cut.at_mm, cut.axis, cut.in_turns);
   double listed = 0, resisted = 0;
   for (std::size_t i = 0; i < cut.hits.size(); ++i) {
     const Hit& h = cut.hits[i];

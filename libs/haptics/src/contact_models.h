@@ -38,7 +38,7 @@ class HeadOverlap {
   OverlapResult last_;
   bool cutting_ = false;
   Vec3 at_mm_, axis_;
-  std::uint32_t phase_ = 0;
+  std::uint32_t stride_ = 1, phase_ = 0;
 };
 
 /// Exact overlap: the stiffness law of the depth of a flat cut of the same volume, against the gradient of the overlap. Where pushes from

@@ -52,13 +52,14 @@ const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, std::size_t too
   if (!finite(at_mm)) return last_;
   at_mm_ = at_mm;
   axis_ = axis;
-  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, falloff_share(burr_library()[tool]), strides_[tool], phase_++);
+  stride_ = strides_[tool];
+  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, falloff_share(burr_library()[tool]), stride_, phase_++);
   return last_;
 }
 
 Cut HeadOverlap::cut() const noexcept {
   if (!cutting_) return {};
-  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3, at_mm_, axis_};
+  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3, at_mm_, axis_, stride_ > 1};
 }
 
 ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {

@@ -15,6 +15,10 @@ constexpr float kHalfDiagonal = 0.8661F;
 constexpr double kFineMm = 0.28, kCoarseMm = 0.56;
 // Counted in grains, a sweep is known to a percent at worst: the burr counts as a little smaller, so that it errs on the side of bone.
 constexpr double kSpareMm = 0.0015;
+// Between two looks at a voxel the burr moves no farther than this if that can be had by looking each tick: what a ball leaves between two
+// places is an eighth of the square of their distance over its radius. But every fourth tick at least.
+constexpr double kTurnMm = 0.1;
+constexpr std::uint32_t kMostTurns = 4;
 
 // Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the normal's parts `m`, which
 // sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), equation 3, as a sum over corners.
@@ -38,11 +42,38 @@ Grains::Grains(const BrickGrid& bone) {
   covered_.resize((voxels + 63) / 64);
   // Twice as much as the burr's traces over 80 cm2 of bone need, or as a small piece has voxels.
   slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, (std::size_t{1} << 21) >> (parts_ == 1 ? 1 : parts_ == 2 ? 3 : 6)));
-  left_.resize(slots_.size() * words_);
+  grains_.resize(slots_.size() * words_);
+}
+
+void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known) {
+  const Frame &a = bone.frame(), &b = from.frame();
+  if (a.spacing_mm != b.spacing_mm || a.origin_mm != b.origin_mm || a.direction != b.direction) return;
+  for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+    const Ijk at = bone.brick_coordinate(brick);
+    const std::uint32_t there = from.find_brick(at.i, at.j, at.k);
+    if (there == BrickGrid::kNone) continue;
+    for (std::uint32_t n = 0; n < BrickGrid::kVoxels; ++n) {
+      const VoxelKey voxel = brick * BrickGrid::kVoxels + n, old = there * BrickGrid::kVoxels + n;
+      const float is = bone.value(voxel), was = from.value(old);
+      if (is > was) continue;
+      // What a saw takes it takes alike of all that is in the voxel.
+      const float kept = was > 0 ? is / was : 1.0F;
+      before_[voxel] = std::max(before_[voxel], static_cast<std::uint8_t>(static_cast<float>(known.before_[old]) * kept + 0.5F));
+      if (is <= 0) continue;
+      if ((known.covered_[old / 64] >> (old % 64) & 1) != 0) covered_[voxel / 64] |= std::uint64_t{1} << (voxel % 64);
+      const std::size_t from_slot = known.find(old);
+      if (known.slots_[from_slot].voxel != old || used_ >= room()) continue;
+      const std::size_t slot = find(voxel);
+      if (slots_[slot].voxel == voxel) continue;
+      slots_[slot] = {voxel, known.slots_[from_slot].grain * kept, known.slots_[from_slot].left};
+      std::copy_n(&known.grains_[from_slot * words_], words_, &grains_[slot * words_]);
+      ++used_;
+    }
+  }
 }
 
 std::size_t Grains::memory_bytes() const {
-  return before_.size() + covered_.size() * sizeof covered_[0] + slots_.size() * sizeof slots_[0] + left_.size() * sizeof left_[0];
+  return before_.size() + covered_.size() * sizeof covered_[0] + slots_.size() * sizeof slots_[0] + grains_.size() * sizeof grains_[0];
 }
 
 // Rows of voxels stay together.
@@ -64,17 +95,22 @@ void Grains::erase(std::size_t slot) noexcept {
     const std::size_t wanted = home(slots_[next].voxel);
     if (((next - wanted) & last) < ((next - slot) & last)) continue;
     slots_[slot] = slots_[next];
-    std::copy_n(&left_[next * words_], words_, &left_[slot * words_]);
+    std::copy_n(&grains_[next * words_], words_, &grains_[slot * words_]);
     slot = next;
   }
   slots_[slot] = {};
   --used_;
 }
 
-void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis) noexcept {
+void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every) noexcept {
   const Frame& frame = bone.frame();
   const double h = frame.spacing_mm.x, b = head.slope();
-  start_ = frame.index_from_world(start_mm + axis * head.start_mm);
+  const Vec3 start = frame.index_from_world(start_mm + axis * head.start_mm);
+  const double moved_mm = length(start - start_) * h + length(axis - axis_) * head.length_mm;
+  start_ = start;
+  axis_ = axis;
+  turns_ = every ? 1 : moved_mm * kMostTurns < kTurnMm ? kMostTurns : moved_mm * 2 < kTurnMm ? 2 : 1;
+  ++turn_;
   const Vec3 along = transposed(frame.direction) * axis;
   for (std::size_t a = 0; a < 3; ++a) head_.axis[a] = static_cast<float>(along[a]);
   head_.length = static_cast<float>(head.length_mm / h);
@@ -86,10 +122,11 @@ void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, 
 
 // All grains that the voxel's bone has.
 void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexcept {
-  std::uint64_t* const left = &left_[slot * words_];
+  std::uint64_t* const left = &grains_[slot * words_];
   const auto density = static_cast<double>(bone.value(voxel));
   std::fill_n(left, words_, ~std::uint64_t{0});
-  slots_[slot] = {voxel, static_cast<float>(density / static_cast<double>(64 * words_))};
+  const auto all = static_cast<std::uint32_t>(64 * words_);
+  slots_[slot] = {voxel, static_cast<float>(density / all), all};
   if (density >= 1) return;
   // The slope of density by what the 26 neighbours were.
   int slope[3] = {};
@@ -120,6 +157,7 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
     std::fill_n(left, words_, ~std::uint64_t{0});
   } else {
     slots_[slot].grain = static_cast<float>(density / count);
+    slots_[slot].left = count;
   }
 }
 
@@ -136,9 +174,10 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
   const float distance = std::sqrt(std::max(q2 - 2 * t * along + t * t, 0.0F)) - (head_.start_radius - head_.slope * t);
   const std::size_t slot = find(voxel);
   const bool known = slots_[slot].voxel == voxel;
-  if (distance > kHalfDiagonal && !known) return bone.value(voxel);
   if (distance > -kHalfDiagonal) {
+    const bool waits = distance > kHalfDiagonal || (voxel / 8 + turn_) % turns_ != 0;
     if (!known) {
+      if (waits) return bone.value(voxel);
       if (used_ >= room()) {
         overflowed_ = true;
         return bone.value(voxel);
@@ -146,9 +185,13 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
       fill(bone, voxel, slot);
       ++used_;
     }
-    overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
-    const std::uint32_t left = overlap::grain_functions().take(shape, at, parts_, &left_[slot * words_]);
-    if (left > 0) return static_cast<float>(left) * slots_[slot].grain;
+    Slot& s = slots_[slot];
+    if (!waits) {
+      const overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope,
+                                 head_.slope_run, 0, head_.ball};
+      s.left = overlap::grain_functions().take(shape, at, parts_, &grains_[slot * words_]);
+    }
+    if (s.left > 0) return static_cast<float>(s.left) * s.grain;
     erase(slot);
   } else if (known) {
     erase(slot);

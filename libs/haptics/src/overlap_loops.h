@@ -188,56 +188,75 @@ inline void run_brick(const Shape& shape, const float* values, const float* firs
   }
 }
 
-// 64 points of a unit cube, from its middle: a lattice of rank 1 with the generators of the longest shortest dual vector, so that planes of
-// points are close together whichever way they face, and along an axis no two points are level.
+// 64 points of a voxel's cubes, from a cube's middle: a lattice of rank 1 with the generators of the longest shortest dual vector, so that
+// planes of points are close together whichever way they face, and along an axis no two points are level.
 struct Lattice {
   float x[64], y[64], z[64];
 };
-constexpr Lattice lattice() {
+constexpr Lattice lattice(unsigned parts) {
   Lattice l{};
+  const auto at = [&](unsigned n) { return ((static_cast<float>(n % 64) + 0.5F) / 64 - 0.5F) / static_cast<float>(parts); };
   for (unsigned n = 0; n < 64; ++n) {
-    l.x[n] = (static_cast<float>(n) + 0.5F) / 64 - 0.5F;
-    l.y[n] = (static_cast<float>(n * 5 % 64) + 0.5F) / 64 - 0.5F;
-    l.z[n] = (static_cast<float>(n * 13 % 64) + 0.5F) / 64 - 0.5F;
+    l.x[n] = at(n);
+    l.y[n] = at(n * 5);
+    l.z[n] = at(n * 13);
   }
   return l;
 }
-inline constexpr Lattice kLattice = lattice();
+
+// Middles of the cubes of a voxel that is cut kParts times along each edge, from its own; a whole number of eights of them.
+template <unsigned kParts>
+struct Cubes {
+  static constexpr unsigned kCount = kParts * kParts * kParts;
+  float x[(kCount + 7) / 8 * 8] = {}, y[(kCount + 7) / 8 * 8] = {}, z[(kCount + 7) / 8 * 8] = {};
+};
+template <unsigned kParts>
+constexpr Cubes<kParts> cubes() {
+  Cubes<kParts> c;
+  for (unsigned n = 0; n < c.kCount; ++n) {
+    c.x[n] = (static_cast<float>(n % kParts) + 0.5F) / kParts - 0.5F;
+    c.y[n] = (static_cast<float>(n / kParts % kParts) + 0.5F) / kParts - 0.5F;
+    c.z[n] = (static_cast<float>(n / (kParts * kParts)) + 0.5F) / kParts - 0.5F;
+  }
+  return c;
+}
+inline F load(const float* p) {
+  F v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
 
 // Clears the bits of points that lie `inside` what takes them; `depth`: how far inside. Cubes that are in or out as a whole are told by
 // their middle.
-template <class Depth, class Inside>
-inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float* at, Depth depth, Inside inside) {
-  const float edge = 1.0F / static_cast<float>(parts), half_diagonal = 0.8661F * edge, first = 0.5F * edge - 0.5F;
-  const std::uint32_t cubes = parts * parts * parts;
+template <unsigned kParts, class Depth, class Inside>
+inline std::uint32_t sift(std::uint64_t* left, const float* at, Depth depth, Inside inside) {
+  static constexpr Cubes<kParts> kCubes = cubes<kParts>();
+  static constexpr Lattice kLattice = lattice(kParts);
+  constexpr unsigned kAtOnce = kCubes.kCount < 8 ? kCubes.kCount : 8;
+  constexpr float kHalfDiagonal = 0.8661F / kParts;
+  const F ax = all(at[0]), ay = all(at[1]), az = all(at[2]);
   std::uint32_t count = 0;
-  for (std::uint32_t eight = 0; eight < cubes; eight += 8) {
-    F cx{}, cy{}, cz{}, deep{};
-    const std::uint32_t n = cubes < 8 ? cubes : 8;
-    for (std::uint32_t l = 0; l < n; ++l) {
-      const std::uint32_t c = eight + l;
-      cx[l] = at[0] + first + edge * static_cast<float>(c % parts);
-      cy[l] = at[1] + first + edge * static_cast<float>(c / parts % parts);
-      cz[l] = at[2] + first + edge * static_cast<float>(c / (parts * parts));
-    }
-    if (parts > 1) deep = depth(cx, cy, cz);
-    for (std::uint32_t l = 0; l < n; ++l) {
-      std::uint64_t& kept = left[eight + l];
+  for (unsigned first = 0; first < kCubes.kCount; first += 8) {
+    std::uint64_t any = 0;
+    for (unsigned l = 0; l < kAtOnce; ++l) any |= left[first + l];
+    if (any == 0) continue;
+    const F cx = ax + load(kCubes.x + first), cy = ay + load(kCubes.y + first), cz = az + load(kCubes.z + first);
+    F deep{};
+    if constexpr (kParts > 1) deep = depth(cx, cy, cz);
+    for (unsigned l = 0; l < kAtOnce; ++l) {
+      std::uint64_t& kept = left[first + l];
       if (kept == 0) continue;
-      if (deep[l] > half_diagonal) {
+      if (deep[l] > kHalfDiagonal) {
         kept = 0;
         continue;
       }
-      if (deep[l] >= -half_diagonal) {
-        const F mx = all(cx[l]), my = all(cy[l]), mz = all(cz[l]), scale = all(edge);
+      if (deep[l] >= -kHalfDiagonal) {
+        const F mx = all(cx[l]), my = all(cy[l]), mz = all(cz[l]);
         M set{};
         for (std::int32_t g = 0; g < 8; ++g) {
-          F x, y, z;
-          std::memcpy(&x, kLattice.x + 8 * g, sizeof x);
-          std::memcpy(&y, kLattice.y + 8 * g, sizeof y);
-          std::memcpy(&z, kLattice.z + 8 * g, sizeof z);
           const std::int32_t bit = 1 << g;
-          set |= inside(mx + scale * x, my + scale * y, mz + scale * z) & M{bit, bit, bit, bit, bit, bit, bit, bit};
+          const M bits{bit, bit, bit, bit, bit, bit, bit, bit};
+          set |= inside(mx + load(kLattice.x + 8 * g), my + load(kLattice.y + 8 * g), mz + load(kLattice.z + 8 * g)) & bits;
         }
         using B = std::uint8_t __attribute__((vector_size(8)));
         const B bytes = __builtin_convertvector(set, B);
@@ -249,6 +268,10 @@ inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float*
     }
   }
   return count;
+}
+template <class Depth, class Inside>
+inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float* at, Depth depth, Inside inside) {
+  return parts == 1 ? sift<1>(left, at, depth, inside) : parts == 2 ? sift<2>(left, at, depth, inside) : sift<4>(left, at, depth, inside);
 }
 
 inline std::uint32_t take_grains(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left) {

@@ -65,6 +65,7 @@ struct Cut {
   double weight_mm3 = 0;  ///< over all voxels under the burr, also those not listed
   double bone_mm3 = 0;    ///< the same without efficiency
   Vec3 at_mm, axis;       ///< where the burr cuts: its tip's centre, in the bone's frame
+  bool in_turns = false;  ///< only some of the voxels under the burr are listed, others the next time
 };
 
 /// A contact model is one way from pose to force; scenes choose one. Everything is allocated when it is made.
@@ -86,7 +87,7 @@ class ContactModel {
 
 /// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight, but nowhere more than what the burr
 /// has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate depends on neither voxels nor ticks.
-/// Remembers where the burr has been: one for each bone, made anew where something else than itself has changed the bone.
+/// Remembers where the burr has been: one for each bone.
 class Removal {
  public:
   explicit Removal(const BrickGrid& bone);
@@ -94,6 +95,7 @@ class Removal {
   std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
                                       const Hardness* hardness, double& removed_mm3) noexcept;
   [[nodiscard]] Grains& grains() { return grains_; }
+  [[nodiscard]] const Grains& grains() const { return grains_; }
 
  private:
   double carry_mm3_ = 0;

@@ -20,10 +20,14 @@ class Grains {
   /// `bone` as nobody has drilled it yet; as large as it is when used.
   explicit Grains(const BrickGrid& bone);
 
-  /// The burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame.
-  void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis) noexcept;
+  /// Takes over what is known of another bone of the same grid that this one came out of by sawing, taking apart or putting together.
+  /// Voxels that have more bone than there count as untouched. Not in the servo.
+  void inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known);
+
+  /// The burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked at.
+  void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every = false) noexcept;
   /// Takes what the burr covers of a voxel where it is placed, and tells how much bone is left that it never covered: density cannot fall
-  /// below. Cost: 5 ns where it covers the voxel whole, else 0.02 (64 grains) to 0.4 us, twice that for tapers.
+  /// below. Unless `every` voxel is looked at, rows of them take turns while the burr moves little. Cost: 5 ns where it covers the voxel whole, else 0.02 (64 grains) to 0.4 us, twice that for tapers.
   [[nodiscard]] float reach(const BrickGrid& bone, VoxelKey voxel) noexcept;
 
   /// How many voxels can be covered in part at a time; the next ones stay as they are until the burr covers them whole.
@@ -41,6 +45,7 @@ class Grains {
   struct Slot {
     VoxelKey voxel = BrickGrid::kNone;
     float grain = 0;  // density of one
+    std::uint32_t left = 0;
   };
   [[nodiscard]] std::size_t home(VoxelKey voxel) const noexcept;
   std::size_t find(VoxelKey voxel) const noexcept;  // its slot, or the free one where it would be
@@ -50,7 +55,7 @@ class Grains {
   std::vector<std::uint8_t> before_;    // density in 1/255 before any drilling
   std::vector<std::uint64_t> covered_;  // whole voxels, a bit each
   std::vector<Slot> slots_;             // open addressing, at most half full
-  std::vector<std::uint64_t> left_;     // words_ to each slot: its grains
+  std::vector<std::uint64_t> grains_;   // words_ to each slot, a bit for each that is left
   std::uint32_t parts_ = 1;  // along each edge of a voxel; 64 grains, a word, in each
   std::size_t words_ = 1, used_ = 0;
   bool overflowed_ = false;
@@ -59,7 +64,8 @@ class Grains {
     float axis[3] = {}, length = 0, start_radius = 0, slope = 0, slope_run = 0;
     bool ball = true;
   } head_;
-  Vec3 start_;
+  Vec3 start_, axis_;
+  std::uint32_t turns_ = 1, turn_ = 0;
 };
 
 }  // namespace osteo
