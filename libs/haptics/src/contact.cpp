@@ -31,6 +31,16 @@ std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, do
   }
 }
 
+std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
+  const RoundCone head = burr.head();
+  const double voxels = std::min(head.start_radius_mm, head.end_radius_mm) / spacing_mm;
+  if (voxels >= kLeastRadiusVoxels) return {};
+  return "the " + burr.name() + " burr is small for voxels of " + format_number(std::round(spacing_mm * 1000) / 1000) +
+         " mm (radius " + format_number(std::round(voxels * 10) / 10) + " voxels): force and its direction are coarse; from " +
+         format_number(std::floor(spacing_mm * voxels / kLeastRadiusVoxels * 100) / 100) +
+         " mm they are true: prepare with a smaller --spacing, or a finer region of interest where it drills";
+}
+
 Removal::Removal(const BrickGrid& bone)
     : grains_(bone), reached_(most_hits(bone.frame().spacing_mm.x) + 512), changes_(most_hits(bone.frame().spacing_mm.x)) {}
 

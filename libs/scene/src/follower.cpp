@@ -134,6 +134,8 @@ std::size_t Follower::drain(StreamReader& reader) {
       const TickRecord& r = ticks_[t];
       wanted += r.voxels_changed;
       removed_mm3_ += static_cast<double>(r.removed_mm3);
+      if (r.voxels_changed > 0) burrs_used_.insert(r.device.tool);
+      ticks_without_room_ += (r.flags & kNoRoom) != 0 ? 1 : 0;
       if (r.structure == 0) continue;
       const auto clearance = static_cast<double>(r.clearance_mm);
       auto& e = structure_events_.try_emplace(r.structure, StructureEvents{clearance, 0, 0}).first->second;

@@ -160,6 +160,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                                  {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
     }
   }
+  if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

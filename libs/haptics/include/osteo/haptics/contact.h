@@ -2,6 +2,7 @@
 #pragma once
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "osteo/base/param.h"
@@ -84,6 +85,11 @@ class ContactModel {
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers.
 [[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm);
+
+/// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force and more.
+inline constexpr double kLeastRadiusVoxels = 2;
+/// What to say of such a burr, and what to do about it; empty for the others.
+[[nodiscard]] std::string too_small_for_voxels(const Burr& burr, double spacing_mm);
 
 /// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight, but nowhere more than what the burr
 /// has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate depends on neither voxels nor ticks.

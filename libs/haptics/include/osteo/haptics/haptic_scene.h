@@ -25,6 +25,7 @@ class TouchedBone {
   void inherit(const TouchedBone& before);
   [[nodiscard]] BrickGrid& bone() const { return bone_; }
   [[nodiscard]] const Body* body() const { return body_.get(); }
+  [[nodiscard]] const Grains& grains() const { return removal_.grains(); }
   /// Whether anything within `radius_mm` of a point (in the bone's own frame) may be bone.
   [[nodiscard]] bool near(Vec3 own_mm, double radius_mm) const noexcept;
 

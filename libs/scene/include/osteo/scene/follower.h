@@ -55,6 +55,10 @@ class Follower {
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
   [[nodiscard]] const std::map<std::uint32_t, StructureEvents>& structure_events() const { return structure_events_; }
+  /// Tools that have removed bone.
+  [[nodiscard]] const std::set<std::uint8_t>& burrs_used() const { return burrs_used_; }
+  /// Ticks in which bone was left that might have gone (kNoRoom).
+  [[nodiscard]] std::uint64_t ticks_without_room() const { return ticks_without_room_; }
 
  private:
   struct Followed {
@@ -108,6 +112,8 @@ class Follower {
   TickRecord latest_;
   double removed_mm3_ = 0, sawn_mm3_ = 0;
   std::map<std::uint32_t, StructureEvents> structure_events_;
+  std::set<std::uint8_t> burrs_used_;
+  std::uint64_t ticks_without_room_ = 0;
 };
 
 }  // namespace osteo
