@@ -13,7 +13,7 @@ namespace osteo {
 /// fall below. Where bone fills a voxel in part, the grains lie on the inner side of the plane that its neighbours tell of (as they were
 /// before any drilling) and that leaves as much bone. Voxels that the burr has covered whole need a bit each, those that it has not
 /// touched nothing but a byte for what they were.
-/// 64 grains a voxel below 0.28 mm, 512 below 0.56 mm, 4096 above. Memory: 1.13 bytes a voxel of the bone, and at most 17 to 19 MB for
+/// 64 grains a voxel below 0.28 mm, 512 below 0.56 mm, 4096 above. Memory: 1.13 bytes a voxel of the bone, and at most 17 to 21 MB for
 /// room() voxels that the burr has covered in part. All of it is made at once; the rest neither allocates nor locks.
 class Grains {
  public:
