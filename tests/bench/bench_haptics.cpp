@@ -319,7 +319,7 @@ void bench_kernel(const Context& context) {
   }
 }
 
-void bench_removal() {
+void bench_removal_rate() {
   std::printf(
       "\n### Removal is a property of the burr\n\nThe same hand, 2 s on flat bone: volume removed over that at 0.5 mm and 1 kHz.\n\n| "
       "method | burr | 0.25 mm | "
@@ -501,7 +501,7 @@ void bench_haptics(const Context& context) {
   bench_contact();
   std::printf("\n");
   bench_kernel(context);
-  bench_removal();
+  bench_removal_rate();
   bench_god_object();
   bench_stability();
   bench_real_time();

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   if (subject == "operation" || subject == "all") osteo::bench_operation(context);
   if (subject == "tissue" || subject == "all") osteo::bench_tissue(context);
   if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
+  if (subject == "removal" || subject == "all") osteo::bench_removal(context);
 #ifdef OSTEO_BENCH_GEOMETRY
   if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
 #else
@@ -25,8 +26,8 @@ int main(int argc, char** argv) {
   }
 #endif
   if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" && subject != "operation" && subject != "tissue" &&
-      subject != "haptics-fuzz") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, tissue\n", subject.c_str());
+      subject != "haptics-fuzz" && subject != "removal") {
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, removal, tissue\n", subject.c_str());
     return 2;
   }
   return 0;

@@ -146,6 +146,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const std::string summary =
       write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
+  for (const std::string& w : s.warnings) io.context.warn(w);
   if (!io.common.quiet) {
     io.err << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
@@ -374,8 +375,21 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
           renderer = std::make_unique<HapticRenderer>(setup, anatomy, 1e-3);
           touched = HapticScene::of(*world, renderer->setup());
           renderer->show(&touched);
-          return touched.changes.size() * sizeof(VoxelChange);
+          std::size_t bytes = touched.changes.size() * sizeof(VoxelChange);
+          for (const HapticScene::Item& i : touched.items) bytes += i.bone->grains().memory_bytes();
+          return bytes;
         });
+  // The smallest of the library that these voxels bear, and what is to be said of the smaller ones.
+  for (const Burr& burr : burr_library()) {
+    if (const std::string text = too_small_for_voxels(burr, world->finest_voxel_mm()); !text.empty()) j["burrs_too_small"].push_back(burr.name());
+  }
+  if (j.contains("burrs_too_small")) {
+    const double least = 2 * kLeastRadiusVoxels * world->finest_voxel_mm();
+    io.context.warn("balls and cylinders of less than " + format_number(std::ceil(least * 10) / 10) + " mm, tapers of less than " +
+                    format_number(std::ceil(2 * least * 10) / 10) + " mm, are small for voxels of " +
+                    format_number(std::round(world->finest_voxel_mm() * 1000) / 1000) +
+                    " mm: force and its direction are coarse; prepare with a smaller --spacing, or a finer region of interest");
+  }
   // A few seconds of drilling, without a clock.
   Script script = make_default_script(*world, true, burr_index(BurrKind::cutting, 4), 5);
   ScriptedDevice device(std::move(script), 1000);

@@ -389,6 +389,12 @@ float World::nearest(Vec3 world_mm) const {
   return most;
 }
 
+double World::finest_voxel_mm() const {
+  double least = bodies_.front().body->bone.frame().spacing_mm.x;
+  for (const PlacedBody& b : bodies_) least = std::min(least, b.body->bone.frame().spacing_mm.x);
+  return least;
+}
+
 double World::volume_mm3() const {
   double sum = 0;
   for (const PlacedBody& b : bodies_) sum += b.body->bone.sum() * b.body->bone.frame().voxel_volume_mm3();

@@ -22,6 +22,25 @@ namespace osteo {
   return std::min<std::size_t>(s.tool, burr_library().size() - 1);
 }
 
+/// The overlap of the library's heads, and what they cut by it: the same voxels whatever method the force comes from.
+class HeadOverlap {
+ public:
+  explicit HeadOverlap(double spacing_mm);
+  /// With `cutting`, cut() is what it would take there.
+  const OverlapResult& measure(const BrickGrid& bone, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept;
+  [[nodiscard]] const OverlapResult& last() const { return last_; }
+  [[nodiscard]] Cut cut() const noexcept;
+
+ private:
+  std::vector<RoundCone> heads_;
+  std::vector<std::uint32_t> strides_;
+  Overlap overlap_;
+  OverlapResult last_;
+  bool cutting_ = false;
+  Vec3 at_mm_, axis_;
+  std::uint32_t stride_ = 1, phase_ = 0;
+};
+
 /// Exact overlap: the stiffness law of the depth of a flat cut of the same volume, against the gradient of the overlap. Where pushes from
 /// opposite sides cancel, as between two walls, so does the force.
 class ExactOverlap final : public ContactModel {
@@ -29,16 +48,11 @@ class ExactOverlap final : public ContactModel {
   ExactOverlap(const ContactParams& params, double spacing_mm);
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
-  [[nodiscard]] const OverlapResult* overlapped() const noexcept override { return &last_; }
+  [[nodiscard]] const OverlapResult* overlapped() const noexcept override { return &head_.last(); }
 
  private:
   ContactParams params_;
-  std::vector<RoundCone> heads_;
-  std::vector<std::uint32_t> strides_;
-  Overlap overlap_;
-  OverlapResult last_;
-  bool cutting_ = false;
-  std::uint32_t phase_ = 0;
+  HeadOverlap head_;
 };
 
 /// The law of ExactOverlap; all but what was immersed.
@@ -64,15 +78,14 @@ class BurrProxy final : public ContactModel {
  private:
   ContactParams params_;
   double spacing_mm_;
-  std::vector<RoundCone> heads_, shells_;
+  std::vector<RoundCone> shells_;
   const std::vector<CutDepth>& shell_depths_;
-  std::vector<std::uint32_t> strides_;
   Overlap overlap_;
+  HeadOverlap head_;
   GodObject proxy_;
   std::size_t tool_ = 0;
   bool cutting_ = false;
   Vec3 advance_mm_, axis_;
-  std::uint32_t phase_ = 0;
 };
 
 /// The thesis' volume sampling (section 3.2.3.4 to 3.2.3.6): each sample of the burr's volume that lies in bone pushes it
@@ -81,7 +94,7 @@ class BurrProxy final : public ContactModel {
 /// that stiffness is in N/mm whatever the burr; unlike the thesis' it is continuous. About 12 ns a sample.
 class VolumeSampling final : public ContactModel {
  public:
-  explicit VolumeSampling(const ContactParams& params);
+  VolumeSampling(const ContactParams& params, double spacing_mm);
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
 
@@ -96,22 +109,15 @@ class VolumeSampling final : public ContactModel {
 
   ContactParams params_;
   std::vector<Tool> tools_;
-  Tool* tool_ = nullptr;  // of the last contact
-  std::vector<Hit> sample_hits_, hits_;
-  std::size_t hit_count_ = 0;
-  double weight_sum_ = 0, density_sum_ = 0;
-  bool cutting_ = false;
-  // Voxel -> weight, cleared after each tick: an open hash table of fixed size.
-  std::vector<VoxelKey> table_key_;
-  std::vector<float> table_weight_;
-  std::vector<std::uint32_t> used_slots_;
+  HeadOverlap head_;
+  DeviceSample last_;
 };
 
 /// The thesis' first method (section 3.2.3.4, after Petersik 2002): samples of the burr's surface, each traced towards the axis until it
 /// leaves the bone. The sum of the penetrations, each along its ray, is the immersed volume and the direction of its push.
 class RaySampling final : public ContactModel {
  public:
-  explicit RaySampling(const ContactParams& params);
+  RaySampling(const ContactParams& params, double spacing_mm);
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
 
@@ -119,9 +125,8 @@ class RaySampling final : public ContactModel {
   static constexpr int kSamples = 400;
   ContactParams params_;
   std::vector<BurrSurface> tools_;
-  std::vector<Hit> hits_;
-  std::size_t hit_count_ = 0;
-  double weight_sum_ = 0, density_sum_ = 0;
+  HeadOverlap head_;
+  DeviceSample last_;
 };
 
 }  // namespace osteo

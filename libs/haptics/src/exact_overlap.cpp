@@ -42,22 +42,36 @@ double falloff_share(const Burr& b) {
 
 }  // namespace
 
-ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm)
-    : params_(params), strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
+HeadOverlap::HeadOverlap(double spacing_mm) : strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
   for (const Burr& b : burr_library()) heads_.push_back(b.head());
+}
+
+const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept {
+  last_ = {};
+  cutting_ = cutting && finite(at_mm);
+  if (!finite(at_mm)) return last_;
+  at_mm_ = at_mm;
+  axis_ = axis;
+  stride_ = strides_[tool];
+  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, falloff_share(burr_library()[tool]), stride_, phase_++);
+  return last_;
+}
+
+Cut HeadOverlap::cut() const noexcept {
+  if (!cutting_) return {};
+  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3, at_mm_, axis_, stride_ > 1};
+}
+
+ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
   static_cast<void>(head_cut_depth(0));  // not in the servo
 }
 
 ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
-  ContactResult r;
-  last_ = {};
-  cutting_ = pose.drill_on != 0;
-  const Vec3 at = position_of(pose), axis = axis_of(pose);
-  if (!finite(at)) return r;
   const std::size_t tool = tool_of(pose);
-  last_ = overlap_.measure(bone, heads_[tool], at, axis, cutting_, falloff_share(burr_library()[tool]), strides_[tool], phase_++);
-  r = contact_of_overlap(params_, tool, last_, axis);
-  r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(last_.bone_mm3 / bone.frame().voxel_volume_mm3())));
+  const Vec3 axis = axis_of(pose);
+  const OverlapResult& o = head_.measure(bone, tool, position_of(pose), axis, pose.drill_on != 0);
+  ContactResult r = contact_of_overlap(params_, tool, o, axis);
+  r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(o.bone_mm3 / bone.frame().voxel_volume_mm3())));
   return r;
 }
 
@@ -79,20 +93,16 @@ ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, 
 }
 
 Cut ExactOverlap::cut(const BrickGrid&) noexcept {
-  if (!cutting_) return {};
-  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3};
+  return head_.cut();
 }
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
     : params_(params),
       spacing_mm_(spacing_mm),
       shell_depths_(shell_depths(spacing_mm)),
-      strides_(strides_for(spacing_mm)),
-      overlap_(most_hits(spacing_mm)) {
-  for (const Burr& b : burr_library()) {
-    heads_.push_back(b.head());
-    shells_.push_back(shell_of(b.head(), spacing_mm));
-  }
+      overlap_(0),
+      head_(spacing_mm) {
+  for (const Burr& b : burr_library()) shells_.push_back(shell_of(b.head(), spacing_mm));
 }
 
 ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
@@ -123,11 +133,14 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
       return c;
     }
     c.normal = there.area_mm2 * (-1 / pressed);
-    const double cosine = -dot(c.normal, axis_), depth = depths(there.sharp_mm3, cosine);
+    const double cosine = -dot(c.normal, axis_), flat_depth = depths(there.sharp_mm3, cosine);
+    // In a hollow of the burr's own shape there is more surface for the same volume than on flat bone, where the depth is twice the mean
+    // thickness of what lies in the shell: there it goes by that thickness.
+    const double hollow = 3 / std::max(there.surface_mm2, 1e-9), depth = std::min(flat_depth, hollow * there.sharp_mm3);
     c.value_mm = shell - depth;
-    // In a hollow of the burr's own shape the volume grows faster than in flat bone: the step out is then the shorter.
-    const double flat = depths.area_mm2(there.sharp_mm3, cosine);
-    c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(pressed / flat, 0.5, 50.0) : 1.0);
+    // And it grows faster: the step out is then the shorter.
+    const double slope = depth < flat_depth ? hollow * pressed : pressed / depths.area_mm2(there.sharp_mm3, cosine);
+    c.gradient = c.normal * (depth > 0.2 * shell ? std::clamp(slope, 0.5, 50.0) : 1.0);
     return c;
   };
   GodObjectParams g;
@@ -152,16 +165,14 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   r.bone_mm3 = there.bone_mm3;
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(there.bone_mm3 / bone.frame().voxel_volume_mm3())));
   cutting_ = pose.drill_on != 0 && r.normal_force_n > 0;
-  // The teeth reach a little beyond where the proxy rests; into what they take there it sinks.
-  advance_mm_ = answer.proxy_mm - answer.normal * std::min(r.depth_mm, 0.5 * spacing_mm_);
+  // The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks.
+  advance_mm_ = answer.proxy_mm - offset * std::min(1.0, 0.75 * spacing_mm_ / r.depth_mm);
   return r;
 }
 
 Cut BurrProxy::cut(const BrickGrid& bone) noexcept {
-  if (!cutting_) return {};
-  const OverlapResult o =
-      overlap_.measure(bone, heads_[tool_], advance_mm_, axis_, true, falloff_share(burr_library()[tool_]), strides_[tool_], phase_++);
-  return {overlap_.hits(), o.weight_mm3, o.bone_mm3};
+  head_.measure(bone, tool_, advance_mm_, axis_, cutting_);
+  return head_.cut();
 }
 
 }  // namespace osteo

@@ -12,7 +12,7 @@ TouchedBone::TouchedBone(const HapticSetup& setup, std::shared_ptr<Body> body) :
 }
 
 TouchedBone::TouchedBone(const HapticSetup& setup, BrickGrid& bone, std::shared_ptr<const Hardness> hardness)
-    : bone_(bone), hardness_(std::move(hardness)), removal_(most_hits(bone.frame().spacing_mm.x)) {
+    : bone_(bone), hardness_(std::move(hardness)), removal_(bone) {
   const double spacing = bone.frame().spacing_mm.x;
   const HapticsParams& params = setup.params;
   method_of_tool_.assign(burr_library().size(), params.contact.method);
@@ -45,6 +45,10 @@ TouchedBone::TouchedBone(const HapticSetup& setup, BrickGrid& bone, std::shared_
 }
 
 TouchedBone::~TouchedBone() = default;
+
+void TouchedBone::inherit(const TouchedBone& before) {
+  removal_.grains().inherit(bone_, before.bone_, before.removal_.grains());
+}
 
 bool TouchedBone::near(Vec3 own_mm, double radius_mm) const noexcept {
   const Vec3 x = bone_.frame().index_from_world(own_mm) - middle_index_;
@@ -80,7 +84,16 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
     for (std::size_t i = 0; before != nullptr && i < before->items.size(); ++i) {
       if (before->items[i].bone->body() == placed.body.get()) item.bone = before->items[i].bone;
     }
-    if (!item.bone) item.bone = std::make_shared<TouchedBone>(setup, placed.body);
+    if (!item.bone) {
+      item.bone = std::make_shared<TouchedBone>(setup, placed.body);
+      // Of those that are gone: another has their place, they came apart, or were put together again.
+      for (std::size_t i = 0; before != nullptr && i < before->items.size(); ++i) {
+        const Body* const old = before->items[i].bone->body();
+        const auto& bodies = world.bodies();
+        if (std::none_of(bodies.begin(), bodies.end(), [&](const PlacedBody& b) { return b.body.get() == old; }))
+          item.bone->inherit(*before->items[i].bone);
+      }
+    }
     scene.items.push_back(std::move(item));
   }
   if (const std::uint32_t plate = world.plate_in_hand(); plate != SceneAction::kNobody) {

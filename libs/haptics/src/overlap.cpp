@@ -23,6 +23,15 @@ BrickFunction brick_function() {
   return chosen;
 }
 
+const GrainFunctions& grain_functions() {
+  const BrickFunction chosen = brick_function();
+#if defined(__x86_64__)
+  if (chosen == &brick_avx512) return kGrainsAvx512;
+  if (chosen == &brick_avx2) return kGrainsAvx2;
+#endif
+  return kGrainsBase;
+}
+
 }  // namespace overlap
 
 namespace {

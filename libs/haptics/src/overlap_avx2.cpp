@@ -4,3 +4,5 @@ void osteo::overlap::brick_avx2(const Shape& shape, const float* values, const f
                                 PartialList& partial) {
   run_brick(shape, values, first, key, sums, list, partial);
 }
+
+const osteo::overlap::GrainFunctions osteo::overlap::kGrainsAvx2{&take_grains, &grains_beyond};

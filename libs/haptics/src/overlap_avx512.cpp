@@ -4,3 +4,5 @@ void osteo::overlap::brick_avx512(const Shape& shape, const float* values, const
                                   PartialList& partial) {
   run_brick(shape, values, first, key, sums, list, partial);
 }
+
+const osteo::overlap::GrainFunctions osteo::overlap::kGrainsAvx512{&take_grains, &grains_beyond};

@@ -4,3 +4,5 @@ void osteo::overlap::brick_base(const Shape& shape, const float* values, const f
                                 PartialList& partial) {
   run_brick(shape, values, first, key, sums, list, partial);
 }
+
+const osteo::overlap::GrainFunctions osteo::overlap::kGrainsBase{&take_grains, &grains_beyond};

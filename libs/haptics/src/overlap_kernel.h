@@ -54,4 +54,16 @@ void brick_avx512(const Shape&, const float*, const float*, VoxelKey, Sums&, Hit
 /// The widest that this machine has, or what OSTEO_SIMD names; all give the same bits.
 BrickFunction brick_function();
 
+/// A voxel's grains: parts^3 cubes, x fastest, of 64 points each, one word of bits a cube.
+/// Both functions leave of a set those points that ..., and tell how many those are.
+struct GrainFunctions {
+  /// ... the shape does not cover. `at`: the voxel's middle minus the start of the axis.
+  std::uint32_t (*take)(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left);
+  /// ... lie beyond a plane: dot(inwards, x) >= least, x from the voxel's middle.
+  std::uint32_t (*plane)(const float* inwards, float least, std::uint32_t parts, std::uint64_t* left);
+};
+extern const GrainFunctions kGrainsBase, kGrainsAvx2, kGrainsAvx512;
+/// As brick_function() chooses.
+const GrainFunctions& grain_functions();
+
 }  // namespace osteo::overlap

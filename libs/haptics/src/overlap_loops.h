@@ -188,5 +188,132 @@ inline void run_brick(const Shape& shape, const float* values, const float* firs
   }
 }
 
+// 64 points of a voxel's cubes, from a cube's middle: a lattice of rank 1 with the generators of the longest shortest dual vector, so that
+// planes of points are close together whichever way they face, and along an axis no two points are level.
+struct Lattice {
+  float x[64], y[64], z[64];
+};
+constexpr Lattice lattice(unsigned parts) {
+  Lattice l{};
+  const auto at = [&](unsigned n) { return ((static_cast<float>(n % 64) + 0.5F) / 64 - 0.5F) / static_cast<float>(parts); };
+  for (unsigned n = 0; n < 64; ++n) {
+    l.x[n] = at(n);
+    l.y[n] = at(n * 5);
+    l.z[n] = at(n * 13);
+  }
+  return l;
+}
+
+// Middles of the cubes of a voxel that is cut kParts times along each edge, from its own; a whole number of eights of them.
+template <unsigned kParts>
+struct Cubes {
+  static constexpr unsigned kCount = kParts * kParts * kParts;
+  float x[(kCount + 7) / 8 * 8] = {}, y[(kCount + 7) / 8 * 8] = {}, z[(kCount + 7) / 8 * 8] = {};
+};
+template <unsigned kParts>
+constexpr Cubes<kParts> cubes() {
+  Cubes<kParts> c;
+  for (unsigned n = 0; n < c.kCount; ++n) {
+    c.x[n] = (static_cast<float>(n % kParts) + 0.5F) / kParts - 0.5F;
+    c.y[n] = (static_cast<float>(n / kParts % kParts) + 0.5F) / kParts - 0.5F;
+    c.z[n] = (static_cast<float>(n / (kParts * kParts)) + 0.5F) / kParts - 0.5F;
+  }
+  return c;
+}
+inline F load(const float* p) {
+  F v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+
+// Clears the bits of points that lie `inside` what takes them; `depth`: how far inside. Cubes that are in or out as a whole are told by
+// their middle.
+template <unsigned kParts, class Depth, class Inside>
+inline std::uint32_t sift(std::uint64_t* left, const float* at, Depth depth, Inside inside) {
+  static constexpr Cubes<kParts> kCubes = cubes<kParts>();
+  static constexpr Lattice kLattice = lattice(kParts);
+  constexpr unsigned kAtOnce = kCubes.kCount < 8 ? kCubes.kCount : 8;
+  constexpr float kHalfDiagonal = 0.8661F / kParts;
+  const F ax = all(at[0]), ay = all(at[1]), az = all(at[2]);
+  std::uint32_t count = 0;
+  for (unsigned first = 0; first < kCubes.kCount; first += 8) {
+    std::uint64_t any = 0;
+    for (unsigned l = 0; l < kAtOnce; ++l) any |= left[first + l];
+    if (any == 0) continue;
+    const F cx = ax + load(kCubes.x + first), cy = ay + load(kCubes.y + first), cz = az + load(kCubes.z + first);
+    F deep{};
+    if constexpr (kParts > 1) deep = depth(cx, cy, cz);
+    for (unsigned l = 0; l < kAtOnce; ++l) {
+      std::uint64_t& kept = left[first + l];
+      if (kept == 0) continue;
+      if (deep[l] > kHalfDiagonal) {
+        kept = 0;
+        continue;
+      }
+      if (deep[l] >= -kHalfDiagonal) {
+        const F mx = all(cx[l]), my = all(cy[l]), mz = all(cz[l]);
+        M set{};
+        for (std::int32_t g = 0; g < 8; ++g) {
+          const std::int32_t bit = 1 << g;
+          const M bits{bit, bit, bit, bit, bit, bit, bit, bit};
+          set |= inside(mx + load(kLattice.x + 8 * g), my + load(kLattice.y + 8 * g), mz + load(kLattice.z + 8 * g)) & bits;
+        }
+        using B = std::uint8_t __attribute__((vector_size(8)));
+        const B bytes = __builtin_convertvector(set, B);
+        std::uint64_t gone;
+        std::memcpy(&gone, &bytes, sizeof gone);
+        kept &= ~gone;
+      }
+      count += static_cast<std::uint32_t>(__builtin_popcountll(kept));
+    }
+  }
+  return count;
+}
+template <class Depth, class Inside>
+inline std::uint32_t sift(std::uint32_t parts, std::uint64_t* left, const float* at, Depth depth, Inside inside) {
+  return parts == 1 ? sift<1>(left, at, depth, inside) : parts == 2 ? sift<2>(left, at, depth, inside) : sift<4>(left, at, depth, inside);
+}
+
+inline std::uint32_t take_grains(const Shape& shape, const float* at, std::uint32_t parts, std::uint64_t* left) {
+  const F start = all(shape.start_radius);
+  if (shape.ball) {
+    const F r2 = start * start;
+    return sift(
+        parts, left, at, [&](F x, F y, F z) { return start - root(x * x + y * y + z * z); },
+        [&](F x, F y, F z) { return x * x + y * y + z * z < r2; });
+  }
+  const F ax = all(shape.axis[0]), ay = all(shape.axis[1]), az = all(shape.axis[2]), length = all(shape.length);
+  const F slope = all(shape.slope), run = all(shape.slope_run);
+  const bool tapers = shape.slope != 0;
+  // The square of the distance from the axis' foot, and the radius there.
+  const auto foot = [&](F x, F y, F z, F& r) {
+    const F along = x * ax + y * ay + z * az, q2 = x * x + y * y + z * z;
+    const F t = least(most(tapers ? along - root(most(q2 - along * along, all(0))) * run : along, all(0)), length);
+    r = start - slope * t;
+    return q2 - all(2) * t * along + t * t;
+  };
+  return sift(
+      parts, left, at,
+      [&](F x, F y, F z) {
+        F r;
+        const F d2 = foot(x, y, z, r);
+        return r - root(most(d2, all(0)));
+      },
+      [&](F x, F y, F z) {
+        F r;
+        const F d2 = foot(x, y, z, r);
+        return d2 < r * r;
+      });
+}
+
+inline std::uint32_t grains_beyond(const float* inwards, float least_dot, std::uint32_t parts, std::uint64_t* left) {
+  const F nx = all(inwards[0]), ny = all(inwards[1]), nz = all(inwards[2]), level = all(least_dot);
+  const F inverse = all(1) / root(nx * nx + ny * ny + nz * nz);
+  const float middle[3] = {};
+  return sift(
+      parts, left, middle, [&](F x, F y, F z) { return (level - (x * nx + y * ny + z * nz)) * inverse; },
+      [&](F x, F y, F z) { return x * nx + y * ny + z * nz < level; });
+}
+
 }  // namespace
 }  // namespace osteo::overlap

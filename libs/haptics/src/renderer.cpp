@@ -227,6 +227,7 @@ std::span<const VoxelChange> HapticRenderer::remove(double& removed_mm3) noexcep
                                               touched_count_ == 1 ? contact_.normal_force_n : share * contact_.normal_force_n,
                                               setup_.params.effects.speed_rpm, dt_s_, bone.hardness_.get(), removed);
     removed_mm3 += removed;
+    if (bone.removal_.grains().overflowed()) flags_ |= kNoRoom;
     const VoxelKey first = bone.body_ ? bone.body_->name_of(0) : 0;
     for (const VoxelChange& c : changes) scene_->changes[count++] = {c.voxel + first, c.density};
     if (bone.depth_map_) {

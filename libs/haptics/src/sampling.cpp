@@ -8,8 +8,6 @@
 namespace osteo {
 namespace {
 
-constexpr std::uint32_t kTableSize = 1 << 13;  // more than twice the samples of a burr
-constexpr std::uint32_t kEmpty = BrickGrid::kNone;
 // Less bone than this in the burr gives no contact: half a sample.
 constexpr double kLeastSamples = 0.5;
 
@@ -20,21 +18,14 @@ Mat3 world_from_tool(Vec3 axis) {
 
 }  // namespace
 
-VolumeSampling::VolumeSampling(const ContactParams& params) : params_(params) {
-  std::size_t most = 0;
+VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
   for (const Burr& burr : burr_library()) {
     Tool tool{sample_burr(burr), {}, {}, {}, false};
     tool.offset_index.resize(tool.samples.offset_mm.size());
     tool.inward_index.resize(tool.samples.offset_mm.size());
-    most = std::max(most, tool.offset_index.size());
     tools_.push_back(std::move(tool));
   }
   static_cast<void>(head_cut_depth(0));  // not in the servo
-  sample_hits_.resize(most);
-  hits_.resize(most);
-  table_key_.assign(kTableSize, kEmpty);
-  table_weight_.assign(kTableSize, 0.0F);
-  used_slots_.resize(most);
 }
 
 void VolumeSampling::orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept {
@@ -52,13 +43,11 @@ void VolumeSampling::orient(Tool& tool, const BrickGrid& bone, const std::array<
 ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
   ContactResult r;
   const std::size_t number = tool_of(pose);
-  tool_ = &tools_[number];
-  hit_count_ = 0;
-  weight_sum_ = density_sum_ = 0;
-  cutting_ = pose.drill_on != 0;
+  Tool& tool = tools_[number];
+  last_ = pose;
   const Vec3 position = position_of(pose), axis = axis_of(pose);
   if (!finite(position)) return r;
-  orient(*tool_, bone, to_floats(axis));
+  orient(tool, bone, to_floats(axis));
 
   const Vec3 centre = bone.frame().index_from_world(position);
   const RoundCone head = burr_library()[number].head();
@@ -72,29 +61,24 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   const float cx = static_cast<float>(centre.x) + (kBase + 0.5F), cy = static_cast<float>(centre.y) + (kBase + 0.5F),
               cz = static_cast<float>(centre.z) + (kBase + 0.5F);
   float sx = 0, sy = 0, sz = 0;
-  double density_sum = 0, weight_sum = 0;
-  const std::size_t n = tool_->offset_index.size();
+  double density_sum = 0;
+  const std::size_t n = tool.offset_index.size();
   for (std::size_t s = 0; s < n; ++s) {
-    const auto& o = tool_->offset_index[s];
+    const auto& o = tool.offset_index[s];
     const VoxelKey voxel =
         bone.find(static_cast<int>(cx + o[0]) - kBase, static_cast<int>(cy + o[1]) - kBase, static_cast<int>(cz + o[2]) - kBase);
     if (voxel == BrickGrid::kNone) continue;
     const float density = bone.value(voxel);
     if (density <= 0) continue;
-    const auto& push = tool_->inward_index[s];
+    const auto& push = tool.inward_index[s];
     sx += push[0] * density;
     sy += push[1] * density;
     sz += push[2] * density;
-    const float weight = density * tool_->samples.efficiency[s];
-    sample_hits_[hit_count_++] = {voxel, weight};
     density_sum += static_cast<double>(density);
-    weight_sum += static_cast<double>(weight);
+    ++r.immersed;
   }
-  r.immersed = static_cast<std::uint32_t>(hit_count_);
   if (density_sum < kLeastSamples) return r;
-  density_sum_ = density_sum * tool_->samples.sample_volume_mm3;
-  weight_sum_ = weight_sum * tool_->samples.sample_volume_mm3;
-  r.bone_mm3 = density_sum_;
+  r.bone_mm3 = density_sum * tool.samples.sample_volume_mm3;
   const Vec3 sum{static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz)};
   const Vec3 direction = bone.frame().direction * normalized(sum);
   r.depth_mm = head_cut_depth(number)(r.bone_mm3, -dot(direction, axis));
@@ -107,37 +91,19 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   return r;
 }
 
-Cut VolumeSampling::cut(const BrickGrid&) noexcept {
-  if (!cutting_ || hit_count_ == 0) return {};
-  // Several samples lie in one voxel.
-  std::size_t used = 0;
-  for (std::size_t h = 0; h < hit_count_; ++h) {
-    if (sample_hits_[h].weight <= 0) continue;
-    std::uint32_t slot = (sample_hits_[h].voxel * 2654435761U) >> 19;
-    while (table_key_[slot] != kEmpty && table_key_[slot] != sample_hits_[h].voxel) slot = (slot + 1) & (kTableSize - 1);
-    if (table_key_[slot] == kEmpty) {
-      table_key_[slot] = sample_hits_[h].voxel;
-      table_weight_[slot] = 0;
-      used_slots_[used++] = slot;
-    }
-    table_weight_[slot] += sample_hits_[h].weight;
-  }
-  for (std::size_t u = 0; u < used; ++u) {
-    hits_[u] = {table_key_[used_slots_[u]], table_weight_[used_slots_[u]]};
-    table_key_[used_slots_[u]] = kEmpty;
-  }
-  return {{hits_.data(), used}, weight_sum_, density_sum_};
+Cut VolumeSampling::cut(const BrickGrid& bone) noexcept {
+  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.drill_on != 0);
+  return head_.cut();
 }
 
-RaySampling::RaySampling(const ContactParams& params) : params_(params), hits_(kSamples * 64) {
+RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
   for (const Burr& burr : burr_library()) tools_.push_back(sample_burr_surface(burr, kSamples));
   static_cast<void>(head_cut_depth(0));  // not in the servo
 }
 
 ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
   ContactResult r;
-  hit_count_ = 0;
-  weight_sum_ = density_sum_ = 0;
+  last_ = pose;
   const Vec3 position = position_of(pose), axis = axis_of(pose);
   if (!finite(position)) return r;
   const BurrSurface& tool = tools_[tool_of(pose)];
@@ -158,23 +124,13 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
     const double reach = static_cast<double>(tool.reach_mm[s]) / h;
     double in = reach;
     float before = density(start);
-    VoxelKey last = BrickGrid::kNone;
     for (double t = 0; t < reach; t += 0.5) {
-      const Vec3 x = start + inward * t;
-      const VoxelKey voxel = bone.find(static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)),
-                                       static_cast<int>(std::floor(x.z + 0.5)));
-      const float d = voxel == BrickGrid::kNone ? 0.0F : bone.value(voxel);
+      const float d = density(start + inward * t);
       if (d < 0.5F) {
         in = std::max(0.0, t - 0.5 * static_cast<double>((0.5F - d) / std::max(before - d, 1e-6F)));
         break;
       }
       before = d;
-      if (pose.drill_on != 0 && voxel != last && hit_count_ < hits_.size()) {
-        hits_[hit_count_++] = {voxel, d * tool.efficiency[s]};
-        weight_sum_ += static_cast<double>(d * tool.efficiency[s]);
-        density_sum_ += static_cast<double>(d);
-        last = voxel;
-      }
     }
     push += (to_world * from_floats(tool.inward[s])) * (in * h);
   }
@@ -192,21 +148,9 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
   return r;
 }
 
-Cut RaySampling::cut(const BrickGrid&) noexcept {
-  if (hit_count_ == 0) return {};
-  // Rays meet in the same voxels: each once, with all its weight.
-  std::sort(hits_.begin(), hits_.begin() + static_cast<std::ptrdiff_t>(hit_count_),
-            [](const Hit& a, const Hit& b) { return a.voxel < b.voxel; });
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < hit_count_; ++i) {
-    if (kept > 0 && hits_[kept - 1].voxel == hits_[i].voxel) {
-      hits_[kept - 1].weight += hits_[i].weight;
-    } else {
-      hits_[kept++] = hits_[i];
-    }
-  }
-  hit_count_ = kept;
-  return {{hits_.data(), kept}, weight_sum_, density_sum_};
+Cut RaySampling::cut(const BrickGrid& bone) noexcept {
+  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.drill_on != 0);
+  return head_.cut();
 }
 
 }  // namespace osteo

@@ -195,6 +195,8 @@ std::size_t Follower::drain(StreamReader& reader) {
       wanted += r.voxels_changed;
       ticks_lost_ += r.tick - next_tick_;
       next_tick_ = r.tick + 1;
+      if (r.voxels_changed > 0) burrs_used_.insert(r.device.tool);
+      ticks_without_room_ += (r.flags & kNoRoom) != 0 ? 1 : 0;
     }
     if (wanted > changes_.size()) changes_.resize(wanted);
     const std::size_t got = reader.changes.pop({changes_.data(), wanted});

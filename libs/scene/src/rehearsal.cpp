@@ -16,6 +16,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
     : device_(std::move(device)),
       options_(options),
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
+      finest_voxel_mm_(world.finest_voxel_mm()),
       operation_(std::move(world), options.haptics, options.anatomy, *device_, stream_, options.rate_hz),
       timed_(options.actions.begin(), options.actions.end()) {
   if (!options_.session_file.empty()) {
@@ -253,6 +254,14 @@ RehearsalSummary Rehearsal::finish() {
   s.fixtures = operation_.world().fixtures();
   s.structures = operation_.renderer().structure_events();
   if (loop_) s.loop = loop_->stats();
+  for (const std::uint8_t tool : follower_->burrs_used()) {
+    const Burr& burr = burr_library()[std::min<std::size_t>(tool, burr_library().size() - 1)];
+    if (std::string text = too_small_for_voxels(burr, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
+  }
+  if (const std::uint64_t n = follower_->ticks_without_room(); n > 0)
+    s.warnings.push_back("in " + std::to_string(n) +
+                         " ticks bone was left at the burr's rim, since too much of the bone is drilled in part to remember it all: larger "
+                         "voxels, or a smaller region, need less");
   if (recorder_) {
     recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash}, [&](std::vector<VoxelChange>& all) {
       for (const PlacedBody& b : operation_.world().bodies()) {

@@ -212,6 +212,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (anatomy.structures) {
     j["structures"] = ordered_json::parse(structures_json(s.structures, *anatomy.structures, rate_hz));
   }
+  if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

@@ -41,6 +41,13 @@ void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
       }
     }
   }
+  const Burr& burr = burr_library()[std::min<std::size_t>(tick.device.tool, burr_library().size() - 1)];
+  if (const std::string small = too_small_for_voxels(burr, rehearsal.finest_voxel_mm()); !small.empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, kAmber);
+    ImGui::TextWrapped("%s", small.c_str());
+    ImGui::PopStyleColor();
+  }
+  if ((tick.flags & kNoRoom) != 0) ImGui::TextColored(kAmber, "no room: bone is left at the burr's rim");
   if ((tick.flags & kShaftContact) != 0) ImGui::TextColored(kAmber, "the shaft touches bone");
   if ((tick.flags & kEscape) != 0) ImGui::TextColored(kRed, "the burr is buried in bone");
   if (rehearsal.pieces() > 1) ImGui::Text("The bone is in %d pieces", rehearsal.pieces());

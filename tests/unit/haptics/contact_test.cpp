@@ -347,7 +347,7 @@ TEST(Removal, WhatIsTakenIsWhatIsMissing) {
     auto bone = slab(0.5);
     const double before = bone.sum();
     const auto model = model_of(method, 0.5);
-    Removal removal(most_hits(0.5));
+    Removal removal(bone);
     double total = 0;
     for (int t = 0; t < 3000; ++t) {
       const auto r = model->contact(bone, at(2 * std::sin(t / 300.0), 2 * std::cos(t / 300.0), 2.5 - t / 1500.0));
@@ -377,7 +377,7 @@ TEST(Removal, PoleRemovesLessThanEquator) {
     const auto rate = [&](std::array<float, 3> axis) {
       auto bone = slab(0.5);
       const auto model = model_of(method, 0.5);
-      Removal removal(most_hits(0.5));
+      Removal removal(bone);
       auto pose = at(0, 0, 1.6);
       pose.axis = axis;
       const auto r = model->contact(bone, pose);
@@ -395,8 +395,8 @@ TEST(Removal, TurnsFasterAndSofterBoneGivesMore) {
   const auto r = model->contact(bone, at(0, 0, 1.6));
   double slow = 0, fast = 0;
   auto copy = bone;
-  Removal(most_hits(0.5)).remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, 30000, 1e-3, nullptr, slow);
-  Removal(most_hits(0.5)).remove(copy, model->cut(copy), burr_library()[3], r.normal_force_n, 60000, 1e-3, nullptr, fast);
+  Removal(bone).remove(bone, model->cut(bone), burr_library()[3], r.normal_force_n, 30000, 1e-3, nullptr, slow);
+  Removal(copy).remove(copy, model->cut(copy), burr_library()[3], r.normal_force_n, 60000, 1e-3, nullptr, fast);
   EXPECT_NEAR(fast / slow, 2, 1e-3);
 }
 

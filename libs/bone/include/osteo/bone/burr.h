@@ -52,8 +52,8 @@ struct Burr {
 [[nodiscard]] const CutDepth& shaft_cut_depth(std::size_t tool);
 /// Error(usage) when there is none.
 [[nodiscard]] int burr_index(BurrKind kind, double diameter_mm, BurrShape shape = BurrShape::ball);
-/// Changes whenever the library does: stored in session files, since indices would mean other burrs.
-inline constexpr int kBurrLibraryVersion = 2;
+/// Changes whenever the library does, or what its burrs remove: stored in session files, since the same poses would come out differently.
+inline constexpr int kBurrLibraryVersion = 3;
 
 /// About 3000 points of a cubic lattice inside the head, each standing for an equal share of its volume.
 struct BurrSamples {

@@ -145,6 +145,8 @@ class World {
   [[nodiscard]] std::string hash() const;
   /// Density at a point of the world, of whichever body has the most there.
   [[nodiscard]] float nearest(Vec3 world_mm) const;
+  /// Edge of the smallest voxels: those of the region where there is one.
+  [[nodiscard]] double finest_voxel_mm() const;
   /// Density over all bodies, mm3.
   [[nodiscard]] double volume_mm3() const;
 

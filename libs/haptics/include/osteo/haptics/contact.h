@@ -2,12 +2,14 @@
 #pragma once
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "osteo/base/param.h"
 #include "osteo/bone/burr.h"
 #include "osteo/bone/hardness.h"
 #include "osteo/grid/brick_grid.h"
+#include "osteo/haptics/grains.h"
 #include "osteo/haptics/overlap.h"
 #include "osteo/haptics/stream.h"
 
@@ -63,6 +65,8 @@ struct Cut {
   std::span<const Hit> hits;
   double weight_mm3 = 0;  ///< over all voxels under the burr, also those not listed
   double bone_mm3 = 0;    ///< the same without efficiency
+  Vec3 at_mm, axis;       ///< where the burr cuts: its tip's centre, in the bone's frame
+  bool in_turns = false;  ///< only some of the voxels under the burr are listed, others the next time
 };
 
 /// A contact model is one way from pose to force; scenes choose one. Everything is allocated when it is made.
@@ -82,17 +86,27 @@ class ContactModel {
 /// `spacing_mm` of the bone it will meet: sizes its buffers.
 [[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm);
 
-/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight; what voxels cannot give any more
-/// is carried to the next call, so that the rate depends on neither voxels nor ticks.
+/// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force and more.
+inline constexpr double kLeastRadiusVoxels = 2;
+/// What to say of such a burr, and what to do about it; empty for the others.
+[[nodiscard]] std::string too_small_for_voxels(const Burr& burr, double spacing_mm);
+
+/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight, but nowhere more than what the burr
+/// has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate depends on neither voxels nor ticks.
+/// Remembers where the burr has been: one for each bone.
 class Removal {
  public:
-  explicit Removal(std::size_t most_hits) : changes_(most_hits) {}
+  explicit Removal(const BrickGrid& bone);
   /// `hardness` may be null. Returns the changed voxels (valid until the next call) and sets what was removed.
   std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
                                       const Hardness* hardness, double& removed_mm3) noexcept;
+  [[nodiscard]] Grains& grains() { return grains_; }
+  [[nodiscard]] const Grains& grains() const { return grains_; }
 
  private:
   double carry_mm3_ = 0;
+  Grains grains_;
+  std::vector<float> reached_;  // of each hit, how much density the burr may still take
   std::vector<VoxelChange> changes_;
 };
 

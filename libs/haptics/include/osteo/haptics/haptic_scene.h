@@ -21,8 +21,11 @@ class TouchedBone {
   TouchedBone(const HapticSetup& setup, std::shared_ptr<Body> body);
   ~TouchedBone();
 
+  /// Where the burr has been in a bone that this one came out of. Nothing is removed from that meanwhile.
+  void inherit(const TouchedBone& before);
   [[nodiscard]] BrickGrid& bone() const { return bone_; }
   [[nodiscard]] const Body* body() const { return body_.get(); }
+  [[nodiscard]] const Grains& grains() const { return removal_.grains(); }
   /// Whether anything within `radius_mm` of a point (in the bone's own frame) may be bone.
   [[nodiscard]] bool near(Vec3 own_mm, double radius_mm) const noexcept;
 
@@ -62,7 +65,7 @@ struct HapticScene {
   std::vector<VoxelChange> changes;  ///< room for those of a tick: make_room() after the last item
   void make_room();
 
-  /// Of a world. Bodies that `before` has already keep what the servo knows of them.
+  /// Of a world. Bodies that `before` has already keep what the servo knows of them; new ones know where the burr has been in the old.
   static HapticScene of(const World& world, const HapticSetup& setup, const HapticScene* before = nullptr);
 };
 

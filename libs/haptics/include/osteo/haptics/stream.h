@@ -39,6 +39,7 @@ enum TickFlag : std::uint32_t {
   kHeld = 2048,              ///< nothing was removed, since the scene is being changed
   kPlateInHand = 4096,       ///< the hand holds a plate, not the drill
   kSoftContact = 8192,       ///< soft tissue pushes the tool
+  kNoRoom = 16384,           ///< bone that the burr covers in part was left: too many voxels are (Grains::room)
 };
 
 /// One tick, as it is written to session files (little endian).

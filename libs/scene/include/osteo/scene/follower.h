@@ -52,6 +52,10 @@ class Follower {
 
   [[nodiscard]] const TickRecord& latest() const { return latest_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
+  /// Tools that have removed bone.
+  [[nodiscard]] const std::set<std::uint8_t>& burrs_used() const { return burrs_used_; }
+  /// Ticks in which bone was left that might have gone (kNoRoom).
+  [[nodiscard]] std::uint64_t ticks_without_room() const { return ticks_without_room_; }
 
  private:
   struct Followed {
@@ -110,6 +114,8 @@ class Follower {
   double sawn_mm3_ = 0;
   std::uint64_t next_tick_ = 0, ticks_lost_ = 0;
   std::size_t happened_before_ = 0;  // actions whose turn comes still, and that have happened to the dust while catching up
+  std::set<std::uint8_t> burrs_used_;
+  std::uint64_t ticks_without_room_ = 0;
 };
 
 }  // namespace osteo

@@ -46,6 +46,7 @@ struct RehearsalSummary {
   std::size_t bodies = 1;                         ///< that move on their own
   std::vector<Fixture> fixtures;
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
+  std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
 };
 
 /// Owns the world while it runs. The servo thread writes densities; the recorder, the follower and whoever asks for a reader are told
@@ -87,6 +88,8 @@ class Rehearsal {
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
+  /// Edge of the finest voxels in the scene.
+  [[nodiscard]] double finest_voxel_mm() const { return finest_voxel_mm_; }
   [[nodiscard]] double stiffness_n_per_mm() const { return operation_.renderer().stiffness_n_per_mm(); }
   [[nodiscard]] Device& device() { return *device_; }
   /// Null where the scene has none; under look() only.
@@ -105,7 +108,7 @@ class Rehearsal {
 
   std::unique_ptr<Device> device_;
   RehearsalOptions options_;
-  double voxel_mm3_;
+  double voxel_mm3_, finest_voxel_mm_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   StreamReader* reader_ = nullptr;
