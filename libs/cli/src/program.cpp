@@ -27,6 +27,7 @@ struct Parsed {
   std::vector<std::string> positionals;
   std::map<std::string, std::string> files;  // --mask FILE, --labels-out FILE: flag without dashes -> file
   std::vector<std::pair<std::string, std::string>> settings;
+  std::set<std::string> given;
 };
 
 Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags,
@@ -71,6 +72,7 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
     }
     const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.flag() == name; });
     if (field != fields.end()) {
+      parsed.given.emplace(field->doc.name);
       if (field->kind() == "flag") {
         field->from_text(value.value_or("true"));
       } else {
@@ -83,6 +85,7 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       const auto off = std::find_if(fields.begin(), fields.end(),
                                     [&](const FieldRef& f) { return f.kind() == "flag" && f.flag() == "--" + name.substr(5); });
       if (off != fields.end()) {
+        parsed.given.emplace(off->doc.name);
         off->from_text("false");
         continue;
       }
@@ -252,6 +255,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     }
     invocation.arguments = std::move(parsed.positionals);
     invocation.settings = std::move(parsed.settings);
+    invocation.given = std::move(parsed.given);
     ready();
     code = command->run(invocation);
   }

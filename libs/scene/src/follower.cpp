@@ -133,6 +133,7 @@ std::size_t Follower::drain(StreamReader& reader) {
     for (std::size_t t = 0; t < n; ++t) {
       const TickRecord& r = ticks_[t];
       wanted += r.voxels_changed;
+      unusable_poses_ += (r.flags & kPoseInvalid) != 0 ? 1 : 0;
       removed_mm3_ += static_cast<double>(r.removed_mm3);
       if (r.structure == 0) continue;
       const auto clearance = static_cast<double>(r.clearance_mm);

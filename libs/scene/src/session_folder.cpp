@@ -4,6 +4,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 #include "osteo/bone/plates.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
@@ -55,7 +56,7 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
     if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
     if (j.contains("resumed_from")) s.resumed_from = folder / j["resumed_from"].get<std::string>();
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + e.what());
+    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + json_complaint(e));
   }
   return s;
 }
@@ -136,6 +137,13 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["surface_hash"] = s.surface_hash;
   j["session_bytes"] = s.session_bytes;
   j["ticks_lost_by_readers"] = s.dropped;
+  if (s.unusable_poses > 0) j["pose_unusable_s"] = static_cast<double>(s.unusable_poses) / rate_hz;
+  // What was asked for and not done, or not so.
+  for (const ActionNote& n : s.notes) {
+    j[n.done ? "actions_done_otherwise" : "actions_refused"].push_back(
+        {{"tick", n.tick}, {"t_s", static_cast<double>(n.tick) / rate_hz}, {"action", name_of(n.kind)}, {"why", n.why}, {"times", n.times}});
+  }
+  if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (!s.pieces.empty()) {
     j["pieces"] = ordered_json::array();
     for (const auto& p : s.pieces) {

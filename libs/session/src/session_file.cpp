@@ -12,6 +12,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 
 namespace osteo {
 namespace {
@@ -220,7 +221,7 @@ Session read_session(const fs::path& path) {
         session.end = SessionEnd{j.at("ticks"), j.at("bone_hash"), j.at("surface_hash"), j.at("removed_mm3"), j.value("dust_hash", "")};
       }
     } catch (const nlohmann::json::exception& e) {
-      throw Error(ExitCode::corrupt, name + " has a damaged frame: " + e.what());
+      throw Error(ExitCode::corrupt, name + " has a damaged frame: " + json_complaint(e));
     }
     at += sizeof head + head.bytes;
   }

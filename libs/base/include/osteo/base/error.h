@@ -36,7 +36,7 @@ inline constexpr ExitCodeDoc exit_code_table[] = {
     {ExitCode::cannot_read, "cannot_read", "the input exists but may not be read"},
     {ExitCode::cannot_write, "cannot_write", "the output cannot be written, or exists already"},
     {ExitCode::failed, "failed", "the method failed or its result is not valid"},
-    {ExitCode::partial, "partial", "some cases of a batch failed"},
+    {ExitCode::partial, "partial", "part of it could not be done: some cases of a batch failed, or actions of a script were refused"},
     {ExitCode::resources, "resources", "out of memory or time"},
     {ExitCode::cancelled, "cancelled", "interrupted by the user; nothing half-written was left behind"},
 };

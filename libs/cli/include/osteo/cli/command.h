@@ -2,6 +2,7 @@
 #pragma once
 #include <iosfwd>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -62,6 +63,7 @@ struct Invocation {
   Common::Params common;
   std::vector<std::string> arguments;                         ///< positionals, in order
   std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
+  std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
   Context context;
   std::ostream& out;
   std::ostream& err;

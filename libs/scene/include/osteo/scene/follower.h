@@ -54,6 +54,8 @@ class Follower {
   [[nodiscard]] const TickRecord& latest() const { return latest_; }
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
+  /// Ticks in which the device gave no pose that could be used.
+  [[nodiscard]] std::uint64_t unusable_poses() const { return unusable_poses_; }
   [[nodiscard]] const std::map<std::uint32_t, StructureEvents>& structure_events() const { return structure_events_; }
 
  private:
@@ -107,6 +109,7 @@ class Follower {
   std::vector<VoxelChange> changes_;
   TickRecord latest_;
   double removed_mm3_ = 0, sawn_mm3_ = 0;
+  std::uint64_t unusable_poses_ = 0;
   std::map<std::uint32_t, StructureEvents> structure_events_;
 };
 
