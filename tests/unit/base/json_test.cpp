@@ -38,7 +38,7 @@ TEST(Json, EveryValueKnowsItsLine) {
 }
 
 TEST(Json, WhatIsNoJsonIsToldWithItsLineAndWithoutTheLibrarysName) {
-  for (const auto& [text, line] : {std::pair{"{\n\n \"a\": }", "line 3"}, {"", "line 1"}, {"{\n\"a\": 1\n", "line 3"}, {"{\"a\": 1}\n{}", "line 2"},
+  for (const auto& [text, line] : {std::pair{"{\n\n \"a\": }", "line 3"}, {"", "line 1"}, {"{\n\"a\": 1\n", "line 2"}, {"{\"a\": 1}\n{}", "line 2"},
                                    {"{\n\"a\": NaN}", "line 2"}, {"{\n\"a\": 1e999}", "line 2"}, {"{\n\"a\": 'x'}", "line 2"}}) {
     const std::string what = refusal(text);
     EXPECT_NE(what.find(std::string("'f.json' ") + line + ": this is not valid JSON"), std::string::npos) << what;

@@ -266,7 +266,7 @@ TEST(World, APlateIsFixedOnlyWhereBoneIsBelowIt) {
   World w(bar(0.5, 0));
   w.act(SceneAction::saw(kMiddle));
   w.act(SceneAction::split(1));
-  const auto mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
+  const auto mini = static_cast<std::uint32_t>(plate_index("midface-4"));
   const std::string before = w.hash();
   const auto refused = [&](const RigidTransform& pose, std::uint32_t body, std::uint32_t other = SceneAction::kNobody) {
     const auto e = w.act(SceneAction::attach(mini, pose, body, other));
@@ -276,7 +276,7 @@ TEST(World, APlateIsFixedOnlyWhereBoneIsBelowIt) {
   EXPECT_NE(refused({{}, {2, 0, 9.5}}, 0, 1).find("not on piece 0"), std::string::npos);   // 5.5 mm above
   EXPECT_NE(refused({{}, {-11, 0, 4}}, 1).find("not on piece 1"), std::string::npos);      // on the other piece
   EXPECT_NE(refused({{}, {-11, 0, 4}}, 0, 1).find("not on piece 1"), std::string::npos);
-  EXPECT_NE(refused(RigidTransform{{}, {2, 0, 4}} * rotation_about({}, {1, 0, 0}, std::numbers::pi), 0).find("not on"), std::string::npos);  // its back to the bone
+  EXPECT_NE(refused(RigidTransform{{}, {2, 0, 6}} * rotation_about({}, {1, 0, 0}, std::numbers::pi), 0).find("not on"), std::string::npos);  // its back to the bone
   EXPECT_EQ(w.fixtures().size(), 0u);
   EXPECT_EQ(w.hash(), before);
   EXPECT_EQ(refused({{}, {2, 0, 8.5}}, 0, 1), "fixed");  // 4.5 mm above
