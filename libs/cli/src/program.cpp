@@ -215,7 +215,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   }
 
   Common::Params common;
-  Invocation invocation{program.registry, {}, {}, {}, {}, out, err, [] {}};
+  Invocation invocation{program.registry, {}, {}, {}, {}, {}, out, err, [] {}};
   const auto ready = [&] {
     printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
     invocation.common = common;
