@@ -60,13 +60,38 @@ cli::CommandInfo RehearseCommand::info() {
           "drill the bone of a case, in a window or by script",
           "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
           "servo, and the session, "
-          "pictures from before and after, and a summary are written. Dense bone resists the burr more, by the HU that the case keeps "
-          "(\"hardness\": false in --settings turns that off).",
+          "pictures from before and after, and a summary are written. Exit code 8 when actions of the script were refused: the summary lists "
+          "them. Dense bone resists the burr more, by the HU that the case keeps (\"hardness\": false in --settings turns that off).",
           {{"case", "a folder made by prepare"}},
           "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
 
+namespace {
+
+// What would have no say is refused, not ignored.
+void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocation& io) {
+  const auto refuse = [&](std::string_view name, const std::string& beside, const std::string& advice) {
+    if (!io.given.contains(std::string(name))) return;
+    FieldRef field{{name, ""}, static_cast<bool*>(nullptr)};
+    throw Error(ExitCode::usage, field.flag() + " has no effect " + beside, advice);
+  };
+  if (!p.script.empty()) {
+    for (const char* const name : {"burr", "diameter_mm", "shape"})
+      refuse(name, "beside --script: a script names its own burr", "change \"burr\" in '" + p.script + "', or leave the flag out");
+    for (const char* const name : {"side", "seconds"}) refuse(name, "beside --script", "it belongs to the built-in strokes; leave it out");
+  }
+  if (!p.headless) {
+    for (const char* const name : {"script", "side", "seconds", "fast"})
+      refuse(name, "in the window", "add --headless, or leave it out");
+  } else {
+    refuse("device", "with --headless", "a script's hand moves the burr; leave it out");
+  }
+}
+
+}  // namespace
+
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
+  if (!p.show_settings) refuse_what_is_ignored(p, io);
   const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
   if (p.show_settings) {
     HapticSetup setup;
@@ -86,6 +111,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
                                  : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy, io.context);
   const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds) : load_script(p.script);
+  const std::vector<std::string> doubts = doubts_about(script, world, p.dust);
+  for (const std::string& d : doubts) io.context.warn(d);
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
 
@@ -131,7 +158,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     s = rehearsal.stop();
     s.interrupted = interrupted;
   }
-  if (const std::string refused = rehearsal.take_refusal(); !refused.empty()) io.context.warn("an action could not be done: " + refused);
+  for (const std::string& w : s.warnings) io.context.warn(w);
+  s.warnings.insert(s.warnings.begin(), doubts.begin(), doubts.end());
   if (s.interrupted) {  // closed all the same; what takes time is left out
     write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
     io.end_progress();
@@ -146,7 +174,15 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const std::string summary =
       write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
-  for (const std::string& w : s.warnings) io.context.warn(w);
+  // Told even when quiet: the exit code is about them.
+  for (const ActionNote& n : s.notes) {
+    if (n.done && io.common.quiet) continue;
+    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << format_number(static_cast<double>(n.tick) / p.rate_hz) << " s: "
+           << name_of(n.kind) << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
+  }
+  if (s.unusable_poses > 0)
+    io.err << "the pose could not be used for " << format_number(static_cast<double>(s.unusable_poses) / p.rate_hz)
+           << " s: not finite, or beyond all reach\n";
   if (!io.common.quiet) {
     io.err << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
@@ -166,7 +202,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
            << folder.string() << '\n';
   }
   if (io.common.json) io.out << summary;
-  return 0;
+  return static_cast<int>(s.refused() ? ExitCode::partial : ExitCode::ok);
 }
 
 cli::CommandInfo ReplayCommand::info() {

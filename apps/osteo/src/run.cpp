@@ -7,6 +7,7 @@
 #include "osteo/base/files.h"
 #include "osteo/cli/report.h"
 #include "osteo/pipeline/pipeline.h"
+#include "osteo/session/script_file.h"
 
 namespace osteo {
 
@@ -69,7 +70,8 @@ cli::CommandInfo DocsCommand::info() {
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   int stale = 0;
-  const auto pages = cli::reference_pages(make_osteo_program());
+  auto pages = cli::reference_pages(make_osteo_program());
+  pages["script.schema.json"] = script_schema();
   for (const auto& [name, content] : pages) {
     const fs::path path = folder / name;
     if (!p.check) {

@@ -23,7 +23,7 @@ std::string with_unit(double value, std::string_view unit) {
   return text;
 }
 
-void check_range(const FieldRef& field, double value) {
+void check_range(const FieldRef& field, std::string_view name, double value) {
   const FieldDoc& d = field.doc;
   if (value >= d.lo && value <= d.hi) return;
   std::string range;
@@ -34,7 +34,7 @@ void check_range(const FieldRef& field, double value) {
   } else {
     range = "at most " + with_unit(d.hi, d.unit);
   }
-  throw Error(ExitCode::usage, field.flag() + " is " + format_number(value) + " but must be " + range);
+  throw Error(ExitCode::usage, std::string(name) + " is " + format_number(value) + " but must be " + range);
 }
 
 }  // namespace
@@ -70,7 +70,8 @@ std::string_view FieldRef::kind() const {
   return std::visit(
       Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
                [](double*) { return std::string_view("number"); }, [](std::string*) { return std::string_view("text"); },
-               [](std::array<double, 3>*) { return std::string_view("triple"); }, [](Choice) { return std::string_view("choice"); }},
+               [](std::array<double, 3>*) { return std::string_view("triple"); },
+               [](std::vector<int>*) { return std::string_view("list"); }, [](Choice) { return std::string_view("choice"); }},
       target);
 }
 
@@ -80,31 +81,37 @@ std::string FieldRef::to_text() const {
                              [](std::array<double, 3>* p) {
                                return format_number((*p)[0]) + "," + format_number((*p)[1]) + "," + format_number((*p)[2]);
                              },
+                             [](std::vector<int>* p) {
+                               std::string text;
+                               for (const int v : *p) text += (text.empty() ? "" : ",") + std::to_string(v);
+                               return text;
+                             },
                              [](Choice c) { return std::string(c.names[static_cast<std::size_t>(*c.index)]); }},
                     target);
 }
 
-void FieldRef::from_text(std::string_view text) const {
+void FieldRef::from_text(std::string_view text, std::string_view called) const {
+  const std::string name = called.empty() ? flag() : std::string(called);
   std::visit(Overload{[&](bool* p) {
                         if (text == "true" || text == "1" || text == "yes" || text.empty()) {
                           *p = true;
                         } else if (text == "false" || text == "0" || text == "no") {
                           *p = false;
                         } else {
-                          throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is neither true nor false");
+                          throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is neither true nor false");
                         }
                       },
                       [&](int* p) {
-                        const double value = parse_number(text, flag());
+                        const double value = parse_number(text, name);
                         if (value != std::floor(value) || std::abs(value) > 2e9) {
-                          throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not a whole number");
+                          throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is not a whole number");
                         }
-                        check_range(*this, value);
+                        check_range(*this, name, value);
                         *p = static_cast<int>(value);
                       },
                       [&](double* p) {
-                        const double value = parse_number(text, flag());
-                        check_range(*this, value);
+                        const double value = parse_number(text, name);
+                        check_range(*this, name, value);
                         *p = value;
                       },
                       [&](std::string* p) { *p = text; },
@@ -114,13 +121,26 @@ void FieldRef::from_text(std::string_view text) const {
                         for (std::size_t i = 0; i < 3; ++i) {
                           const std::size_t comma = rest.find(',');
                           if ((comma == std::string_view::npos) != (i == 2)) {
-                            throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
+                            throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is not three numbers like 1,2,3");
                           }
-                          value[i] = parse_number(rest.substr(0, comma), flag());
-                          check_range(*this, value[i]);
+                          value[i] = parse_number(rest.substr(0, comma), name);
+                          check_range(*this, name, value[i]);
                           rest = i == 2 ? std::string_view() : rest.substr(comma + 1);
                         }
                         *p = value;
+                      },
+                      [&](std::vector<int>* p) {
+                        std::vector<int> values;
+                        for (std::string_view rest = text; !rest.empty();) {
+                          const std::size_t comma = rest.find(',');
+                          const double value = parse_number(rest.substr(0, comma), name);
+                          if (value != std::floor(value) || std::abs(value) > 2e9)
+                            throw Error(ExitCode::usage, name + ": '" + std::string(rest.substr(0, comma)) + "' is not a whole number");
+                          check_range(*this, name, value);
+                          values.push_back(static_cast<int>(value));
+                          rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+                        }
+                        *p = std::move(values);
                       },
                       [&](Choice c) {
                         for (std::size_t i = 0; i < c.names.size(); ++i) {
@@ -130,8 +150,8 @@ void FieldRef::from_text(std::string_view text) const {
                           }
                         }
                         std::string list;
-                        for (const auto name : c.names) list.append(list.empty() ? "" : ", ").append(name);
-                        throw Error(ExitCode::usage, flag() + ": '" + std::string(text) + "' is not one of " + list);
+                        for (const auto choice : c.names) list.append(list.empty() ? "" : ", ").append(choice);
+                        throw Error(ExitCode::usage, name + ": '" + std::string(text) + "' is not one of " + list);
                       }},
              target);
 }

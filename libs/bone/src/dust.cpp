@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "osteo/base/files.h"
 
@@ -218,19 +219,42 @@ void Dust::step_brick(Brick& brick) {
   }
 }
 
+// Row by row, as if all cells of the ball were walked; but dust lies in bricks alone, so that no radius costs more than they do.
 template <class F>
 void Dust::in_ball(Vec3 centre_mm, double radius_mm, F&& f) {
   const Frame& frame = bone_.frame();
   const Vec3 x = frame.index_from_world(centre_mm);
   const double r = radius_mm / frame.spacing_mm.x;
-  if (!(std::abs(x.x) < 1e5 && std::abs(x.y) < 1e5 && std::abs(x.z) < 1e5) || !(r > 0 && r < 1e4)) return;
-  for (int k = static_cast<int>(std::floor(x.z - r)); k <= x.z + r; ++k)
-    for (int j = static_cast<int>(std::floor(x.y - r)); j <= x.y + r; ++j)
-      for (int i = static_cast<int>(std::floor(x.x - r)); i <= x.x + r; ++i) {
-        const Vec3 d = Vec3{double(i), double(j), double(k)} - x;
-        if (dot(d, d) > r * r) continue;
-        if (std::uint32_t* const units = cell({i, j, k}, false); units != nullptr && *units > 0) f(Ijk{i, j, k}, *units, d);
+  if (!std::isfinite(dot(x, x)) || !(r > 0)) return;
+  std::vector<Brick*> met;
+  for (const auto& b : bricks_) {
+    const Ijk o{b->at.i * 8, b->at.j * 8, b->at.k * 8};
+    if (o.i <= x.x + r && o.i + 7 >= x.x - r && o.j <= x.y + r && o.j + 7 >= x.y - r && o.k <= x.z + r && o.k + 7 >= x.z - r)
+      met.push_back(b.get());
+  }
+  const auto place = [](const Brick* b) { return std::tuple(b->at.k, b->at.j, b->at.i); };
+  std::sort(met.begin(), met.end(), [&](const Brick* a, const Brick* b) { return place(a) < place(b); });
+  for (auto layer = met.begin(); layer != met.end();) {
+    const auto layer_end = std::find_if(layer, met.end(), [&](const Brick* b) { return b->at.k != (*layer)->at.k; });
+    for (int k = 0; k < 8; ++k) {
+      for (auto row = layer; row != layer_end;) {
+        const auto row_end = std::find_if(row, layer_end, [&](const Brick* b) { return b->at.j != (*row)->at.j; });
+        for (int j = 0; j < 8; ++j) {
+          for (auto b = row; b != row_end; ++b) {
+            for (int i = 0; i < 8; ++i) {
+              std::uint32_t& units = (*b)->units[BrickGrid::offset_in_brick(i, j, k)];
+              if (units == 0) continue;
+              const Ijk c{(*b)->at.i * 8 + i, (*b)->at.j * 8 + j, (*b)->at.k * 8 + k};
+              const Vec3 d = Vec3{double(c.i), double(c.j), double(c.k)} - x;
+              if (dot(d, d) <= r * r) f(c, units, d);
+            }
+          }
+        }
+        row = row_end;
       }
+    }
+    layer = layer_end;
+  }
 }
 
 void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "hardness_json.h"
 #include "osteo/base/error.h"
+#include "osteo/base/json.h"
 #include "osteo/grid/sampler.h"
 
 namespace osteo {
@@ -16,33 +16,17 @@ double HardnessLaw::at(double hu) const {
 }
 
 HardnessLaw parse_hardness(std::string_view text, const std::string& name) {
+  const JsonFile file(text, name);
   HardnessLaw law;
-  std::string where = name;
-  try {
-    const auto j = nlohmann::ordered_json::parse(text, nullptr, true, true);
-    if (!j.is_object() || j.value("osteotome_hardness", 0) != 1) throw Error(ExitCode::usage, "\"osteotome_hardness\" must be 1");
-    const auto fields = fields_of<HardnessLaw>(law);
-    for (const auto& [key, value] : j.items()) {
-      const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(std::min(text.find('"' + key + '"'), text.size())), '\n');
-      where = name + ", line " + std::to_string(line + 1);
-      if (key == "osteotome_hardness" || (key == "source" && value.is_string())) continue;
-      const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
-      if (f == fields.end()) {
-        std::vector<std::string> known{"source"};
-        for (const FieldRef& r : fields) known.emplace_back(r.doc.name);
-        const std::string near = nearest_name(key, known);
-        throw Error(ExitCode::usage, "there is no \"" + key + "\"" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"));
-      }
-      if (!value.is_number()) throw Error(ExitCode::usage, "\"" + key + "\" must be a number");
-      f->from_text(value.dump());
-    }
-    where = name;
-    if (!(law.zero_hu < law.cortical_hu)) throw Error(ExitCode::usage, "\"zero_hu\" must be below \"cortical_hu\"");
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::usage, where + ": " + e.what());
-  } catch (const Error& e) {
-    throw e.in(where);
-  }
+  int version = 0;
+  std::string source;
+  auto fields = fields_of<HardnessLaw>(law);
+  detail::FieldCollector others;
+  others({"osteotome_hardness", "version of the format", "", 1, 1, true}, version);
+  others({"source", "where the constants are from"}, source);
+  fields.insert(fields.end(), others.fields.begin(), others.fields.end());
+  file.read(file.root(), "", fields);
+  if (!(law.zero_hu < law.cortical_hu)) throw file.wrong(file.root(), "\"zero_hu\" must be below \"cortical_hu\"");
   return law;
 }
 

@@ -5,6 +5,8 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/param.h"
+#include "osteo/bone/plate_fit.h"
 #include "osteo/bone/plates.h"
 
 namespace osteo {
@@ -63,9 +65,14 @@ void World::add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness)
   for (std::size_t a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::lround(lo[a] + 0.5));
     last[a] = static_cast<int>(std::lround(hi[a] - 0.5));
-    if (std::abs(first[a] - 0.5 - lo[a]) > 0.01 || std::abs(last[a] + 0.5 - hi[a]) > 0.01)
+    if (!(std::abs(first[a] - 0.5 - lo[a]) <= 0.01) || !(std::abs(last[a] + 0.5 - hi[a]) <= 0.01))
       throw refuse("its box cuts through voxels of the bone");
+    first[a] = std::max(first[a], 0);
+    last[a] = std::min(last[a], c.dims[a] - 1);
   }
+  if (too_many_bricks(next_brick_ + fine.brick_count()))
+    throw Error(ExitCode::resources, "bone and region of interest together have more bricks than can be numbered",
+                "make the region smaller, or its voxels larger");
   for (int k = first[2]; k <= last[2]; ++k) {
     for (int j = first[1]; j <= last[1]; ++j) {
       for (int i = first[0]; i <= last[0]; ++i) {
@@ -98,19 +105,20 @@ const PlacedBody* World::owner(VoxelKey name) const {
   return nullptr;
 }
 
-World::Done World::snapshot(ActionKind kind) const {
+World::Done World::snapshot(ActionKind kind, std::uint32_t of) const {
   Done d;
   d.kind = kind;
+  d.of = of;
   for (const PlacedBody& b : bodies_) d.poses.emplace_back(b.body->id, b.world_from_body);
   d.fixtures = fixtures_;
   return d;
 }
 
 void World::remember(Done done) {
-  // Dragging is one move, not one for each picture: only where it began is kept.
-  const bool goes_on = done.kind == ActionKind::move && !done_.empty() && done_.back().kind == ActionKind::move;
-  const bool opens_on = done.kind == ActionKind::open && !done_.empty() && done_.back().kind == ActionKind::open;
-  if (!goes_on && !opens_on) done_.push_back(std::move(done));
+  // Dragging a piece is one move, not one for each picture: only where it began is kept. So is turning a distractor's screw.
+  const bool goes_on = (done.kind == ActionKind::move || done.kind == ActionKind::open) && !done_.empty() &&
+                       done_.back().kind == done.kind && done_.back().of == done.of;
+  if (!goes_on) done_.push_back(std::move(done));
 }
 
 std::vector<std::uint32_t> World::joined_to(std::uint32_t body, std::uint32_t except) const {
@@ -139,6 +147,19 @@ void World::move_group(const std::vector<std::uint32_t>& group, const RigidTrans
   }
 }
 
+// Which of the pieces that a plate is to be fixed to is not there; kNobody: none.
+std::uint32_t World::not_under_plate(const SceneAction& attach) const {
+  const auto gaps = plate_gaps(*this, plate_library()[attach.item], attach.transform(), 0, 400, SceneAction::kPlateReachMm);
+  for (const std::uint32_t id : {attach.body, attach.other}) {
+    if (id == SceneAction::kNobody) continue;
+    const auto on = [&](const PlateGap& g) {
+      return g.body == id || (g.body != SceneAction::kNobody && id == bodies_.front().body->id && find(g.body)->of_region);
+    };
+    if (std::none_of(gaps.begin(), gaps.end(), on)) return id;
+  }
+  return SceneAction::kNobody;
+}
+
 World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
   Effect effect;
   const bool was_held = std::exchange(held_, a.is(ActionKind::hold));
@@ -159,6 +180,10 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       return undo();
     case ActionKind::suction:
     case ActionKind::irrigate:
+      held_ = was_held;
+      if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
+        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) + " mm make sense");
+      break;
     case ActionKind::yield:
       held_ = was_held;
       break;
@@ -172,7 +197,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::move: {
       if (!known(a.body)) return nothing("there is no piece " + std::to_string(a.body));
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
-      Done before = snapshot(ActionKind::move);
+      Done before = snapshot(ActionKind::move, a.body);
       const RigidTransform by = a.transform() * find(a.body)->world_from_body.inverse();
       move_group(joined_to(a.body, SceneAction::kNobody), by);
       placed(a.body)->world_from_body = a.transform();  // to the bit
@@ -184,6 +209,9 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       if (!known(a.body) || (a.other != SceneAction::kNobody && !known(a.other)) || a.body == a.other)
         return nothing("a plate is attached to one piece, or to two that are not the same");
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
+      if (const std::uint32_t off = not_under_plate(a); off != SceneAction::kNobody)
+        return nothing("the plate is not on piece " + std::to_string(off) + ": no bone of it begins within " +
+                       format_number(SceneAction::kPlateReachMm) + " mm below its underside");
       remember(snapshot(ActionKind::attach));
       Fixture f;
       f.id = next_fixture_++;
@@ -205,8 +233,9 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       const double most = plate_library()[fixture->plate].most_opening_mm;
       if (most <= 0) return nothing("'" + plate_library()[fixture->plate].name + "' is no distractor");
       if (fixture->other == SceneAction::kNobody) return nothing("the distractor is fixed to one piece only");
-      Done before = snapshot(ActionKind::open);
+      Done before = snapshot(ActionKind::open, a.item);
       const double opening = std::clamp(a.values[0], 0.0, most);
+      if (opening != a.values[0]) effect.message = "opened to " + format_number(opening) + " mm: it goes no further";
       const std::vector<std::uint32_t> group = joined_to(fixture->other, fixture->id);
       if (std::find(group.begin(), group.end(), fixture->body) != group.end())
         return nothing("another plate holds the two pieces together");
@@ -261,6 +290,8 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
     return nothing("bone with a region of interest is not taken apart");
   Effect effect;
   Done before = snapshot(ActionKind::split);
+  // What is given out stays given only when all goes well.
+  std::uint32_t next_body = next_body_, next_brick = next_brick_;
   std::vector<PlacedBody> bodies;
   std::vector<PlacedBody> made;
   for (const PlacedBody& placed : bodies_) {
@@ -276,7 +307,6 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
     Split split = split_bone(bone, *labels, a.values[0]);
     // What is all crumbs stays as it is: a scene has at least the body it began with.
     if (split.pieces.empty() || split.changed_bricks.empty()) continue;
-    if (next_brick_ + bone.brick_count() * split.pieces.size() >= (1U << 23)) return nothing("too many pieces: voxels have no names left");
     for (const auto& [voxel, density] : split.loose) {
       before.loose.emplace_back(placed.body->name_of(voxel), density);
       effect.dust.emplace_back(placed.body->name_of(voxel), density);
@@ -286,8 +316,9 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
         std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, std::move(split.pieces[0].bone), placed.body->hardness});
     for (std::size_t p = 1; p < split.pieces.size(); ++p) {
       Piece& piece = split.pieces[p];
-      auto body = std::make_shared<Body>(Body{next_body_++, next_brick_, std::move(piece.bone), nullptr});
-      next_brick_ += static_cast<std::uint32_t>(body->bone.brick_count());
+      if (too_many_bricks(next_brick + piece.bone.brick_count())) return nothing("too many pieces: no names are left for their voxels");
+      auto body = std::make_shared<Body>(Body{next_body++, next_brick, std::move(piece.bone), nullptr});
+      next_brick += static_cast<std::uint32_t>(body->bone.brick_count());
       if (placed.body->hardness) body->hardness = std::make_shared<const Hardness>(*placed.body->hardness, piece.origin.brick);
       before.children.emplace_back(body->id, placed.body->id);
       effect.made.push_back({body->id, placed.body->id, std::move(piece.origin)});
@@ -297,6 +328,8 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
   if (effect.changed.empty()) return nothing("the bone hangs together");
   bodies_ = std::move(bodies);
   bodies_.insert(bodies_.end(), made.begin(), made.end());
+  next_body_ = next_body;
+  next_brick_ = next_brick;
   remember(std::move(before));
   return effect;
 }
@@ -325,12 +358,12 @@ World::Effect World::undo() {
   for (const auto& [child, parent] : last.children) {
     const PlacedBody piece = *find(child);
     const BrickGrid& from = piece.body->bone;
-    const BrickGrid& to = find(parent)->body->bone;  // same bricks, whether renewed or not
+    const std::shared_ptr<const Body> whole = find(parent)->body;  // kept: what is given back goes into a new one, with the same bricks
     for (VoxelKey v = 0; v < from.brick_count() * BrickGrid::kVoxels; ++v) {
       const float density = from.value(v);
       if (density <= 0) continue;
       const Ijk c = from.coordinate(v);
-      give_back(parent, to.find(c.i, c.j, c.k), density);
+      give_back(parent, whole->bone.find(c.i, c.j, c.k), density);
     }
     bodies_.erase(bodies_.begin() + (find(child) - bodies_.data()));
     effect.gone.push_back(child);

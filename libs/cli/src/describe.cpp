@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "osteo/base/error.h"
+#include "osteo/base/json.h"
 #include "osteo/pipeline/formats.h"
 
 namespace osteo::cli {
@@ -143,31 +144,7 @@ std::vector<FieldRef> common_fields() {
 }
 
 ordered_json schema_of(const FieldRef& f) {
-  ordered_json s;
-  const std::string_view kind = f.kind();
-  const std::string text = f.to_text();
-  if (kind == "flag") {
-    s["type"] = "boolean";
-    s["default"] = text == "true";
-  } else if (kind == "int" || kind == "number") {
-    s["type"] = kind == "int" ? "integer" : "number";
-    if (std::isfinite(f.doc.lo)) s["minimum"] = f.doc.lo;
-    if (std::isfinite(f.doc.hi)) s["maximum"] = f.doc.hi;
-    s["default"] = parse_number(text, f.doc.name);
-  } else if (kind == "triple") {
-    s["type"] = "array";
-    s["items"] = {{"type", "number"}};
-    s["minItems"] = 3;
-    s["maxItems"] = 3;
-  } else if (kind == "choice") {
-    s["enum"] = std::get<FieldRef::Choice>(f.target).names;
-    s["default"] = text;
-  } else {
-    s["type"] = "string";
-    s["default"] = text;
-  }
-  s["description"] = std::string(f.doc.help) + (f.doc.unit.empty() ? "" : " [" + std::string(f.doc.unit) + "]");
-  return s;
+  return ordered_json::parse(field_schema(f));
 }
 
 // A parameter may also be a variable of the pipeline: "${spacing_mm}".
@@ -469,7 +446,7 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
     pages["command-" + info.name + ".md"] = page;
   }
   index += "\n## Flags of every stage and command\n\n" + markdown_fields(common_fields());
-  index += "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [bash completion](osteo.bash).\n";
+  index += "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of strokes](script.schema.json), [bash completion](osteo.bash).\n";
   pages["README.md"] = index;
   std::string codes = note + "# Exit codes\n\n| code | name | meaning |\n|---|---|---|\n";
   for (const auto& d : exit_code_table)

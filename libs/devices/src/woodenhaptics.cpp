@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 
 namespace osteo {
 namespace {
@@ -18,24 +18,11 @@ constexpr double kTurn = 2 * std::numbers::pi;
 WoodenHapticsGeometry load_woodenhaptics(const fs::path& path) {
   WoodenHapticsGeometry g;
   const std::string name = "'" + path.string() + "'";
-  try {
-    const auto j = nlohmann::ordered_json::parse(read_text(path), nullptr, true, true);
-    if (j.at("osteotome_woodenhaptics") != 1) throw Error(ExitCode::usage, name + ": \"osteotome_woodenhaptics\" must be 1");
-    const auto fields = fields_of<WoodenHapticsGeometry>(g);
-    for (const auto& [key, value] : j.items()) {
-      if (key == "osteotome_woodenhaptics") continue;
-      const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
-      if (f == fields.end()) throw Error(ExitCode::usage, name + " has no setting \"" + key + "\"");
-      std::string text = value.dump();
-      if (value.is_array()) {
-        text.clear();
-        for (const auto& v : value) text += (text.empty() ? "" : ",") + v.dump();
-      }
-      f->from_text(text);
-    }
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::usage, name + ": " + e.what());
-  }
+  const JsonFile file(read_text(path), path.string());
+  auto fields = fields_of<WoodenHapticsGeometry>(g);
+  int version = 0;
+  fields.push_back({{"osteotome_woodenhaptics", "version of the format", "", 1, 1, true}, &version});
+  file.read(file.root(), "", fields);
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(g.capstan_diameter_mm[a] > 0) || !(g.body_diameter_mm[a] > 0) || !(g.link_mm[a] > 0) || !(g.counts_a_turn[a] > 0) ||
         !(g.torque_constant_nm_per_a[a] > 0) || !(g.gimbal_counts_a_turn[a] > 0))

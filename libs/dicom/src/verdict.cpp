@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
+#include "osteo/base/json.h"
 
 namespace osteo {
 namespace {
@@ -137,7 +138,7 @@ VerdictSummary read_verdict(std::string_view text) {
     }
     return summary;
   } catch (const nlohmann::json::exception& e) {
-    throw no_verdict(e.what());
+    throw no_verdict(json_complaint(e));
   }
 }
 

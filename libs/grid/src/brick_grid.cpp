@@ -4,6 +4,7 @@
 #include <cstring>
 #include <tuple>
 
+#include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/parallel.h"
 
@@ -11,11 +12,21 @@ namespace osteo {
 
 BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), origins_(std::move(bricks)) {
   std::sort(origins_.begin(), origins_.end(), [](Ijk a, Ijk b) { return std::tie(a.k, a.j, a.i) < std::tie(b.k, b.j, b.i); });
+  if (too_many_bricks(origins_.size()))
+    throw Error(ExitCode::corrupt,
+                "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " + std::to_string(kMostBricks) + " can be numbered",
+                "make it with larger voxels, or of a smaller region");
   for (const Ijk b : origins_) {
+    if (b.i < 0 || b.j < 0 || b.k < 0) throw Error(ExitCode::corrupt, "the sparse grid has voxels at negative indices");
     extent_[0] = std::max(extent_[0], static_cast<std::uint32_t>(b.i + 1));
     extent_[1] = std::max(extent_[1], static_cast<std::uint32_t>(b.j + 1));
     extent_[2] = std::max(extent_[2], static_cast<std::uint32_t>(b.k + 1));
   }
+  if (too_wide_for_bricks({extent_[0], extent_[1], extent_[2]}))
+    throw Error(ExitCode::corrupt,
+                "the sparse grid's voxels lie too far apart: within " + std::to_string(8ULL * extent_[0]) + " x " +
+                    std::to_string(8ULL * extent_[1]) + " x " + std::to_string(8ULL * extent_[2]) + " voxels",
+                "single voxels far from the rest are mostly a fault of the program that wrote it; make it again, or of a smaller region");
   table_.assign(static_cast<std::size_t>(extent_[0]) * extent_[1] * extent_[2], kNone);
   for (std::uint32_t n = 0; n < origins_.size(); ++n) {
     const Ijk b = origins_[n];

@@ -259,6 +259,10 @@ class Resampler {
             }
           }
           if (any) bricks_.push_back({i, j, k});
+          if (too_many_bricks(bricks_.size()))
+            throw Error(ExitCode::resources, "voxels of " + format_number(h_) + " mm make more than " + std::to_string(BrickGrid::kMostBricks) +
+                        " bricks of 8^3 that may hold bone, which is all that can be numbered",
+                        "choose a larger --spacing-mm, or a smaller region");
         }
       }
     }
@@ -324,11 +328,12 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
     p.lower = lower_of_mask(ct, mask);
     context.report("lower_hu", p.lower);
   }
-  double voxels = 1;
-  for (std::size_t a = 0; a < 3; ++a) voxels *= std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm);
-  if (voxels > 4e10) {
-    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than 4*10^10",
-                "choose a larger --spacing-mm");
+  std::array<std::uint64_t, 3> cells{};
+  for (std::size_t a = 0; a < 3; ++a)
+    cells[a] = static_cast<std::uint64_t>(std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
+  if (too_wide_for_bricks(cells)) {
+    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " +
+                std::to_string(BrickGrid::kMostCells) + " bricks of 8^3", "choose a larger --spacing-mm, or a smaller region");
   }
   ResampledBone result;
   result.volume_before_mm3 = static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *

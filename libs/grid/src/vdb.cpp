@@ -2,8 +2,10 @@
 
 #include <openvdb/tools/Prune.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
+#include <limits>
 #include <mutex>
 
 #include "osteo/base/error.h"
@@ -61,7 +63,7 @@ Frame frame_of(const openvdb::FloatGrid& grid) {
   }
   f.origin_mm = {m(3, 0), m(3, 1), m(3, 2)};
   const auto box = grid.evalActiveVoxelBoundingBox();
-  for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = box.max()[a] + 1;
+  for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = std::min(box.max()[a], std::numeric_limits<int>::max() - 1) + 1;
   if (const auto meta = grid.getMetadata<openvdb::Vec3IMetadata>("osteo_dims")) {
     for (int a = 0; a < 3; ++a) f.dims[static_cast<std::size_t>(a)] = meta->value()[a];
   }
@@ -71,7 +73,16 @@ Frame frame_of(const openvdb::FloatGrid& grid) {
 }  // namespace
 
 BrickGrid to_bricks(const SparseGrid& sparse, bool all) {
-  openvdb::FloatTree tree(sparse.impl->grid->tree());
+  const openvdb::FloatTree& stored = sparse.impl->grid->tree();
+  // Before a tile becomes voxels: one of 4096^3 takes a few bytes in a file.
+  std::uint64_t tiles = 0;
+  auto tile = stored.cbeginValueOn();
+  tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) tiles += tile.getVoxelCount() / BrickGrid::kVoxels;
+  if (too_many_bricks(tiles))
+    throw Error(ExitCode::corrupt, "the sparse grid is solid over " + std::to_string(tiles) + " bricks of 8^3 voxels; " +
+                std::to_string(BrickGrid::kMostBricks) + " can be numbered", "make it with larger voxels, or of a smaller region");
+  openvdb::FloatTree tree(stored);
   tree.voxelizeActiveTiles();
   std::vector<Ijk> bricks;
   const auto holds_value = [all](const auto& leaf) {
@@ -83,7 +94,6 @@ BrickGrid to_bricks(const SparseGrid& sparse, bool all) {
   };
   for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
     const auto o = leaf->origin();
-    if (o.x() < 0 || o.y() < 0 || o.z() < 0) throw Error(ExitCode::corrupt, "the sparse grid has voxels at negative indices");
     if (holds_value(*leaf)) bricks.push_back({o.x() >> 3, o.y() >> 3, o.z() >> 3});
   }
   BrickGrid result(sparse.frame, std::move(bricks));

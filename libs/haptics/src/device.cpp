@@ -43,7 +43,7 @@ DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n)
   HandGoal goal;
   goal.tool = static_cast<std::uint8_t>(script_.tool);
   goal.axis = to_floats(script_.axis);
-  goal.drill_on = w[leg_].drill_on ? 1 : 0;
+  goal.drill_on = w[leg_].drill_on && leg_ + 1 < w.size() ? 1 : 0;
   goal.position_mm = w[leg_].at_mm;
   if (leg_ + 1 < w.size()) {
     const double s = std::clamp((t - w[leg_].t_s) / (w[leg_ + 1].t_s - w[leg_].t_s), 0.0, 1.0);

@@ -34,8 +34,8 @@ CubicField::CubicField(const Frame& frame, std::vector<float> values) : frame_(f
 }
 
 CubicField::CubicField(const SparseGrid& distance_mm) : frame_(distance_mm.frame) {
-  values_.assign(frame_.voxel_count(), static_cast<float>(distance_mm.background));
   const BrickGrid bricks = to_bricks(distance_mm, true);
+  values_.assign(frame_.voxel_count(), static_cast<float>(distance_mm.background));
   const auto& n = frame_.dims;
   for (std::uint32_t b = 0; b < bricks.brick_count(); ++b) {
     const float* const v = bricks.values_of_brick(b);

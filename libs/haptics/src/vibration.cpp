@@ -6,6 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 #include "vibration_json.h"
 
 namespace osteo {
@@ -34,7 +35,7 @@ VibrationSpectrum parse_vibration(std::string_view text, const std::string& name
       if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks) refuse("has more than 16 peaks in the band");
     }
   } catch (const nlohmann::json::exception& e) {
-    refuse(e.what());
+    refuse(json_complaint(e));
   }
   return s;
 }

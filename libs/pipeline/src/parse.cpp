@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
+#include "osteo/base/json.h"
 #include "osteo/pipeline/pipeline.h"
 
 namespace osteo {
@@ -18,7 +19,7 @@ json parse_json(std::string_view text) {
   } catch (const json::parse_error& e) {
     std::size_t line = 1;
     for (std::size_t i = 0; i + 1 < e.byte && i < text.size(); ++i) line += text[i] == '\n' ? 1 : 0;
-    fail("line " + std::to_string(line), "this is not valid JSON", e.what());
+    fail("line " + std::to_string(line), "this is not valid JSON", json_complaint(e));
   }
 }
 
@@ -60,7 +61,7 @@ auto with_json_errors(F&& read) {
   try {
     return read();
   } catch (const json::exception& e) {
-    fail("", "a value has the wrong type", e.what());
+    fail("", "a value has the wrong type", json_complaint(e));
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/pipeline/report_json.h"
 
@@ -235,7 +236,7 @@ std::map<std::string, ManifestFile> parse_manifest(std::string_view json) {
       files[role] = std::move(file);
     }
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, std::string("it is damaged: ") + e.what(), "run 'osteo prepare' again");
+    throw Error(ExitCode::corrupt, std::string("it is damaged: ") + json_complaint(e), "run 'osteo prepare' again");
   }
   if (!files.contains("bone")) throw Error(ExitCode::corrupt, "it names no bone");
   return files;

@@ -197,6 +197,7 @@ std::size_t Follower::drain(StreamReader& reader) {
       next_tick_ = r.tick + 1;
       if (r.voxels_changed > 0) burrs_used_.insert(r.device.tool);
       ticks_without_room_ += (r.flags & kNoRoom) != 0 ? 1 : 0;
+      unusable_poses_ += (r.flags & kPoseInvalid) != 0 ? 1 : 0;
     }
     if (wanted > changes_.size()) changes_.resize(wanted);
     const std::size_t got = reader.changes.pop({changes_.data(), wanted});

@@ -7,8 +7,9 @@
 namespace osteo {
 namespace {
 
+// Or looks at densities (where a plate lies), which must be those that a replay finds.
 bool takes_time(const SceneAction& a) {
-  return a.is(ActionKind::saw) || a.is(ActionKind::split) || a.is(ActionKind::undo);
+  return a.is(ActionKind::saw) || a.is(ActionKind::split) || a.is(ActionKind::undo) || a.is(ActionKind::attach);
 }
 bool changes_what_is_touched(const SceneAction& a) {
   return !(a.is(ActionKind::hold) || a.is(ActionKind::resume) || a.is(ActionKind::suction) || a.is(ActionKind::irrigate) ||

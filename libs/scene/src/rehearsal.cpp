@@ -73,9 +73,16 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   }
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
   if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(follower_->large_pieces().size());
-  if (!effect.done) {
+  // Soft tissue yields again with its next update.
+  if (!effect.message.empty() && !action.is(ActionKind::yield)) {
     const std::lock_guard lock(queue_mutex_);
-    refused_ = std::string(name_of(static_cast<ActionKind>(action.kind))) + ": " + effect.message;
+    const auto kind = static_cast<ActionKind>(action.kind);
+    if (!effect.done) refused_ = std::string(name_of(kind)) + ": " + effect.message;
+    if (!notes_.empty() && notes_.back().kind == kind && notes_.back().done == effect.done && notes_.back().why == effect.message) {
+      ++notes_.back().times;
+    } else {
+      notes_.push_back({operation_.ticks(), kind, effect.done, effect.message, 1});
+    }
   }
   return true;
 }
@@ -253,6 +260,8 @@ RehearsalSummary Rehearsal::finish() {
   s.bodies = operation_.world().bodies().size();
   s.fixtures = operation_.world().fixtures();
   s.structures = operation_.renderer().structure_events();
+  s.notes = notes_;
+  s.unusable_poses = follower_->unusable_poses();
   if (loop_) s.loop = loop_->stats();
   for (const std::uint8_t tool : follower_->burrs_used()) {
     const Burr& burr = burr_library()[std::min<std::size_t>(tool, burr_library().size() - 1)];

@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 #include "osteo/bone/plates.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
@@ -56,7 +57,7 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
     if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
     if (j.contains("resumed_from")) s.resumed_from = folder / j["resumed_from"].get<std::string>();
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + e.what());
+    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + json_complaint(e));
   }
   return s;
 }
@@ -196,6 +197,13 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   }
   if (s.ticks_not_followed > 0) j["ticks_not_followed"] = s.ticks_not_followed;
   if (s.interrupted) j["interrupted"] = true;
+  if (s.unusable_poses > 0) j["pose_unusable_s"] = static_cast<double>(s.unusable_poses) / rate_hz;
+  // What was asked for and not done, or not so.
+  for (const ActionNote& n : s.notes) {
+    j[n.done ? "actions_done_otherwise" : "actions_refused"].push_back(
+        {{"tick", n.tick}, {"t_s", static_cast<double>(n.tick) / rate_hz}, {"action", name_of(n.kind)}, {"why", n.why}, {"times", n.times}});
+  }
+  if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (!s.pieces.empty()) {
     j["pieces"] = ordered_json::array();
     for (const auto& p : s.pieces) {
@@ -212,7 +220,6 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (anatomy.structures) {
     j["structures"] = ordered_json::parse(structures_json(s.structures, *anatomy.structures, rate_hz));
   }
-  if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

@@ -1,17 +1,15 @@
 #include "osteo/session/haptic_settings.h"
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
+#include "osteo/bone/hardness.h"
 #include "osteo/io/points_io.h"
 
 namespace osteo {
 namespace {
-
-using nlohmann::ordered_json;
 
 struct CurveFields {
   using Params = CurveConstraintParams;
@@ -30,21 +28,14 @@ std::vector<FieldRef> all_fields(HapticSetup& setup) {
   return fields;
 }
 
-std::string text_of(const ordered_json& value) {
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
-
 // { "diamond": "proxy", "cutting taper": "volume" }: a burr is meant when its name holds all of the words.
-void set_tool_methods(const ordered_json& tools, const std::string& name, HapticSetup& setup) {
-  for (const auto& [words, method_name] : tools.items()) {
+void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup& setup) {
+  if (tools.kind != JsonValue::Kind::object) throw file.wrong(tools, "\"tools\" must be an object in braces");
+  for (const auto& [words, method_name] : tools.members) {
     ContactMethod method{};
     detail::FieldCollector collect;
-    collect({"tools", "method of contact"}, method);
-    try {
-      collect.fields.front().from_text(method_name.get<std::string>());
-    } catch (const Error& e) {
-      throw e.in(name + ": tools: " + words);
-    }
+    collect({words, "method of contact"}, method);
+    file.read(method_name, "tools", collect.fields.front());
     bool any = false;
     for (std::size_t t = 0; t < burr_library().size(); ++t) {
       const Burr& b = burr_library()[t];
@@ -58,8 +49,8 @@ void set_tool_methods(const ordered_json& tools, const std::string& name, Haptic
       any = true;
     }
     if (!any)
-      throw Error(ExitCode::usage, name + ": tools: no burr is a \"" + words + "\"",
-                  "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm");
+      throw file.wrong(method_name, "tools: no burr is a \"" + words + "\"",
+                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm");
   }
 }
 
@@ -67,51 +58,41 @@ void set_tool_methods(const ordered_json& tools, const std::string& name, Haptic
 
 void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
   require_readable(path);
-  const std::string name = "'" + path.string() + "'";
-  try {
-    const auto j = ordered_json::parse(read_text(path), nullptr, true, true);
-    if (j.at("osteotome_haptics") != 1) throw Error(ExitCode::usage, name + ": \"osteotome_haptics\" must be 1");
-    const auto fields = all_fields(setup);
-    for (const auto& [key, value] : j.items()) {
-      if (key == "osteotome_haptics") continue;
-      const auto beside = [&] { return path.parent_path() / value.get<std::string>(); };
-      if (key == "tools") {
-        set_tool_methods(value, name, setup);
-      } else if (key == "hardness") {
-        if (value == "auto") {
-          setup.hardness.reset();
-        } else if (value.is_boolean()) {
-          setup.hardness = value.get<bool>();
-        } else {
-          throw Error(ExitCode::usage, name + ": \"hardness\" must be true, false or \"auto\"");
-        }
-      } else if (key == "hardness_file") {
-        setup.hardness_json = read_text(beside());
-        static_cast<void>(parse_hardness(setup.hardness_json, "'" + beside().string() + "'"));
-      } else if (key == "curve_file") {
-        setup.curve = load_points(beside());
-        if (setup.curve.size() < 2) throw Error(ExitCode::usage, name + ": the curve has fewer than 2 points");
-      } else if (key == "vibration_file") {
-        setup.vibration_json = read_text(beside());
-        static_cast<void>(parse_vibration(setup.vibration_json, "'" + beside().string() + "'"));
-      } else {
-        const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
-        if (f == fields.end()) {
-          std::vector<std::string> known{"tools", "hardness", "hardness_file", "curve_file", "vibration_file"};
-          for (const FieldRef& r : fields) known.emplace_back(r.doc.name);
-          const std::string near = nearest_name(key, known);
-          throw Error(ExitCode::usage, name + " has no setting \"" + key + "\"" + (near.empty() ? "" : ": did you mean \"" + near + "\"?"),
-                      "osteo rehearse CASE --show-settings lists them");
-        }
-        try {
-          f->from_text(text_of(value));
-        } catch (const Error& e) {
-          throw e.in(name);
-        }
-      }
+  const JsonFile file(read_text(path), path.string());
+  int version = 0;
+  std::string curve_file, vibration_file, hardness_file;
+  auto fields = all_fields(setup);
+  detail::FieldCollector others;
+  others({"osteotome_haptics", "version of the format", "", 1, 1, true}, version);
+  others({"hardness_file", "constants of the law of hardness, beside this file"}, hardness_file);
+  others({"curve_file", "points of a curve, beside this file"}, curve_file);
+  others({"vibration_file", "measured vibration, beside this file"}, vibration_file);
+  fields.insert(fields.end(), others.fields.begin(), others.fields.end());
+  const std::vector<std::string> besides{"tools", "hardness"};
+  file.read(file.root(), "", fields, besides);
+  if (const JsonValue* const tools = file.root().find("tools")) set_tool_methods(*tools, file, setup);
+  if (const JsonValue* const hardness = file.root().find("hardness")) {
+    if (hardness->kind == JsonValue::Kind::flag) {
+      setup.hardness = hardness->flag;
+    } else if (hardness->kind == JsonValue::Kind::text && hardness->text == "auto") {
+      setup.hardness.reset();
+    } else {
+      throw file.wrong(*hardness, "\"hardness\" must be true, false or \"auto\"");
     }
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::usage, name + ": " + e.what(), "osteo rehearse CASE --show-settings prints a file to start from");
+  }
+  if (!hardness_file.empty()) {
+    const fs::path beside = path.parent_path() / hardness_file;
+    setup.hardness_json = read_text(beside);
+    static_cast<void>(parse_hardness(setup.hardness_json, beside.string()));
+  }
+  if (!curve_file.empty()) {
+    setup.curve = load_points(path.parent_path() / curve_file);
+    if (setup.curve.size() < 2) throw file.wrong(*file.root().find("curve_file"), "the curve has fewer than 2 points");
+  }
+  if (!vibration_file.empty()) {
+    const fs::path beside = path.parent_path() / vibration_file;
+    setup.vibration_json = read_text(beside);
+    static_cast<void>(parse_vibration(setup.vibration_json, "'" + beside.string() + "'"));
   }
 }
 

@@ -14,6 +14,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 
 namespace osteo {
 namespace {
@@ -416,7 +417,7 @@ Session read_session(const fs::path& path, Damage damage) {
     }
     reading.cut();
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, name + " has a damaged frame: " + e.what());
+    throw Error(ExitCode::corrupt, name + " has a damaged frame: " + json_complaint(e));
   }
   session.torn_bytes = bytes.size() - at;
   if (damage == Damage::refuse && session.damaged()) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
+#include "osteo/base/json.h"
 #include "osteo/tissue/calibrate.h"
 #include "problem_inp.h"
 
@@ -30,12 +31,39 @@ Material material(const ordered_json& j) {
   return {j.at("young_kpa").get<double>() / 1000, j.at("poisson").get<double>()};
 }
 
+// A key that is not known would be left out in silence.
+void allow_known_keys(const JsonFile& file) {
+  const auto each = [&](const JsonValue& object, const char* key, const std::string& where, auto&& f) {
+    const JsonValue* const list = object.find(key);
+    for (std::size_t n = 0; list != nullptr && n < list->items.size(); ++n) f(list->items[n], where + " " + std::to_string(n + 1));
+  };
+  using Keys = std::vector<std::string>;
+  const auto at_a_place = [&](Keys keys) {
+    return [&file, keys = std::move(keys)](const JsonValue& v, const std::string& where) mutable {
+      Keys all{"name", "about", "box_mm", "at_mm", "radius_mm"};
+      all.insert(all.end(), keys.begin(), keys.end());
+      file.allow(v, where, all);
+    };
+  };
+  const JsonValue& root = file.root();
+  file.allow(root, "", Keys{"osteotome_tissue", "$schema", "about", "material", "regions", "fixed", "loads"});
+  if (const JsonValue* const m = root.find("material")) file.allow(*m, "material", Keys{"young_kpa", "poisson"});
+  each(root, "regions", "region", at_a_place({"young_kpa", "poisson"}));
+  each(root, "fixed", "fixed", at_a_place({"axes"}));
+  each(root, "loads", "load", [&](const JsonValue& l, const std::string& where) {
+    file.allow(l, where, Keys{"name", "about", "forces", "surfaces"});
+    each(l, "forces", where + ", force", at_a_place({"total_n"}));
+    each(l, "surfaces", where + ", surface", at_a_place({"kpa"}));
+  });
+}
+
 }  // namespace
 
 TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads) {
   if (const std::size_t first = json.find_first_not_of(" \t\r\n"); first != std::string_view::npos && json[first] == '*')
     return tissue::problem_of_inp(json, mesh, needs_loads);
   TissueProblem problem;
+  allow_known_keys(JsonFile(json, "tissue problem"));
   std::string where = "header";
   const auto refuse = [&](const std::string& what, const std::string& advice = {}) {
     return Error(ExitCode::usage, "the tissue problem, " + where + ": " + what, advice);
@@ -126,7 +154,7 @@ TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, b
     where = "loads";
     if (needs_loads && problem.loads.empty()) throw refuse("there is none");
   } catch (const nlohmann::json::exception& e) {
-    throw refuse(e.what(), "docs/tissue.md describes the file");
+    throw refuse(json_complaint(e), "docs/tissue.md describes the file");
   }
   return problem;
 }
@@ -139,7 +167,7 @@ TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, 
       if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
       return j;
     } catch (const nlohmann::json::exception& e) {
-      throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
+      throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + json_complaint(e));
     }
   }();
   // One material a voxel, from those of its tetrahedra.
@@ -156,7 +184,7 @@ TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, 
     return with_log_factors(model, constants->at("grid").get<std::array<int, 3>>(),
                             constants->at("log_factors").get<std::vector<double>>());
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + e.what());
+    throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + json_complaint(e));
   }
 }
 

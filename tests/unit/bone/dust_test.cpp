@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 
 #include "osteo/bone/dust.h"
@@ -121,6 +123,49 @@ TEST(Dust, OutOfReachItIsCounted) {
   for (int s = 0; s < 400; ++s) dust.step();
   EXPECT_DOUBLE_EQ(dust.totals().fallen_mm3, dust.totals().added_mm3);
   EXPECT_EQ(dust.awake_bricks(), 0u);
+}
+
+// A radius is no reason to walk cells that hold nothing: what is reached is the same as far as dust lies, whatever the radius.
+TEST(Dust, ARadiusBeyondAllBoundsCostsNoMoreThanTheDustThatLies) {
+  const auto bone = bowl();
+  const auto heap = [&] {
+    auto dust = std::make_unique<Dust>(bone);
+    for (int s = 0; s < 200; ++s) {
+      dust->add(bone.find(24, 10, 24), 0.05);
+      dust->step();
+    }
+    return dust;
+  };
+  // Nearest first, from a place in the middle of it, as if every cell of the ball were asked.
+  const auto by_hand = heap(), sucked = heap(), washed = heap();
+  struct Cell {
+    double d2;
+    Vec3 at;
+    double mm3;
+  };
+  std::vector<Cell> cells;
+  const Vec3 nozzle{0.3, 3.1, -0.2};
+  const double voxel = bone.frame().voxel_volume_mm3();
+  by_hand->visit([&](Vec3 p, double full) { cells.push_back({dot(p - nozzle, p - nozzle), p, full * 0.35 * voxel}); });
+  std::stable_sort(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) { return a.d2 < b.d2; });
+  ASSERT_GT(cells.size(), 100u);
+  double wanted = 0.5 * by_hand->totals().present_mm3, first = 0;
+  std::size_t emptied = 0;
+  for (const Cell& c : cells) {
+    if (first + c.mm3 > wanted) break;
+    first += c.mm3;
+    ++emptied;
+  }
+  EXPECT_NEAR(sucked->suck(nozzle, 1e7, wanted), wanted, 1e-4);
+  std::size_t left = 0;
+  sucked->visit([&](Vec3, double) { ++left; });
+  EXPECT_NEAR(static_cast<double>(left), static_cast<double>(cells.size() - emptied), 1);
+  EXPECT_GT(washed->irrigate({0, 0, 0}, 1e300, 1), 0);
+  EXPECT_EQ(washed->totals().present_mm3, 0);
+  for (const double odd : {0.0, -3.0, std::nan("")}) EXPECT_EQ(by_hand->suck(nozzle, odd, 1), 0);
+  EXPECT_EQ(by_hand->suck({std::nan(""), 0, 0}, 5, 1), 0);
+  EXPECT_EQ(by_hand->suck({1e300, 0, 0}, 5, 1), 0);
+  EXPECT_EQ(by_hand->totals().sucked_mm3, 0);
 }
 
 }  // namespace

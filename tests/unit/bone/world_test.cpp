@@ -2,17 +2,26 @@
 
 #include <gtest/gtest.h>
 
+#include <malloc.h>
+
 #include <cmath>
 #include <numbers>
 #include <random>
 
 #include "bar.h"
+#include "osteo/base/error.h"
 #include "osteo/bone/live_surface.h"
 #include "osteo/bone/plate_fit.h"
 #include "osteo/bone/plates.h"
 #include "osteo/mesh/mesh_info.h"
 
 namespace osteo {
+
+struct WorldProbe {
+  static std::uint32_t& next_brick(World& w) { return w.next_brick_; }
+  static std::uint32_t& next_body(World& w) { return w.next_body_; }
+};
+
 namespace {
 
 using test::bar;
@@ -48,6 +57,84 @@ TEST(World, SawSplitMoveAndBackToTheBit) {
   ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
   EXPECT_EQ(w.hash(), whole);
   EXPECT_FALSE(w.act(SceneAction::plain(ActionKind::undo)).done);
+}
+
+// Where nobody else holds the body that is given back to, it is gone as soon as the first voxel is: its memory is overwritten here to see
+// whether anything still reads it (as the address sanitizer sees it too).
+TEST(World, UndoReadsNothingThatItGaveBack) {
+  World w(bar(0.25, 0.4));
+  const std::string whole = w.hash();
+  ASSERT_TRUE(w.act(SceneAction::saw(kMiddle)).done);
+  ASSERT_TRUE(w.act(SceneAction::split(1)).done);
+  mallopt(M_PERTURB, 0x5a);
+  const bool both = w.act(SceneAction::plain(ActionKind::undo)).done && w.act(SceneAction::plain(ActionKind::undo)).done;
+  mallopt(M_PERTURB, 0);
+  EXPECT_TRUE(both);
+  EXPECT_EQ(w.hash(), whole);
+}
+
+TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
+  World w(bar(0.5, 0));
+  for (const double x : {-5.0, 5.0}) w.act(SceneAction::saw({{x, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));
+  w.act(SceneAction::split(1));
+  ASSERT_EQ(w.bodies().size(), 3u);
+  const auto shift = [&](std::uint32_t id) { return w.find(id)->world_from_body.shift_mm.y; };
+  const auto drag = [&](std::uint32_t id, double from, double to) {
+    for (int s = 0; s <= 4; ++s) ASSERT_TRUE(w.act(SceneAction::move(id, {{}, {0, from + (to - from) * s / 4, 0}})).done);
+  };
+  const auto undo = [&] { return w.act(SceneAction::plain(ActionKind::undo)).done; };
+  drag(1, 0, 10);
+  drag(0, 0, 20);
+  drag(1, 10, 30);
+  EXPECT_EQ(w.undo_steps(), 6u);
+  ASSERT_TRUE(undo());
+  EXPECT_EQ(shift(1), 10);
+  EXPECT_EQ(shift(0), 20);
+  ASSERT_TRUE(undo());
+  EXPECT_EQ(shift(1), 10);
+  EXPECT_EQ(shift(0), 0);
+  ASSERT_TRUE(undo());
+  EXPECT_EQ(shift(1), 0);
+  // The same for the screws of two distractors.
+  const auto distractor = static_cast<std::uint32_t>(plate_index("distractor"));
+  ASSERT_TRUE(w.act(SceneAction::attach(distractor, {{}, {-5, 0, 4}}, 0, 1)).done);
+  ASSERT_TRUE(w.act(SceneAction::attach(distractor, {{}, {5, 0, 4}}, 0, 2)).done);
+  const std::size_t before = w.undo_steps();
+  for (const double mm : {1.0, 2.0, 3.0}) ASSERT_TRUE(w.act(SceneAction::open(1, mm)).done);
+  for (const double mm : {1.0, 2.0}) ASSERT_TRUE(w.act(SceneAction::open(2, mm)).done);
+  EXPECT_EQ(w.undo_steps(), before + 2);
+  ASSERT_TRUE(undo());
+  EXPECT_EQ(w.fixtures()[1].opening_mm, 0);
+  EXPECT_EQ(w.fixtures()[0].opening_mm, 3);
+  ASSERT_TRUE(undo());
+  EXPECT_EQ(w.fixtures()[0].opening_mm, 0);
+}
+
+TEST(World, NamesAreCountedAsTheyAreGivenAndARefusalTakesNone) {
+  World w(bar(0.5, 0));
+  ASSERT_TRUE(w.act(SceneAction::saw(kMiddle)).done);
+  const auto bricks = static_cast<std::uint32_t>(w.bodies()[0].body->bone.brick_count());
+  World enough = w.copy();
+  ASSERT_TRUE(enough.act(SceneAction::split(1)).done);
+  const std::uint32_t piece = WorldProbe::next_brick(enough) - bricks;
+  ASSERT_LT(piece, bricks);
+  // All but one of the names that it takes.
+  const std::string before = w.hash();
+  WorldProbe::next_brick(w) = BrickGrid::kMostBricks - piece + 1;
+  const auto refused = w.act(SceneAction::split(1));
+  EXPECT_FALSE(refused.done);
+  EXPECT_NE(refused.message.find("names"), std::string::npos);
+  EXPECT_EQ(w.hash(), before);
+  EXPECT_EQ(WorldProbe::next_brick(w), BrickGrid::kMostBricks - piece + 1);
+  EXPECT_EQ(WorldProbe::next_body(w), 1u);
+  EXPECT_EQ(w.undo_steps(), 1u);
+  // The very last ones.
+  WorldProbe::next_brick(w) = BrickGrid::kMostBricks - piece;
+  ASSERT_TRUE(w.act(SceneAction::split(1)).done);
+  EXPECT_EQ(w.bodies()[1].body->id, 1u);
+  const VoxelKey last = w.bodies()[1].body->name_of(piece * BrickGrid::kVoxels - 1);
+  EXPECT_NE(last, BrickGrid::kNone);
+  EXPECT_EQ(w.owner(last), &w.bodies()[1]);
 }
 
 TEST(World, WhatWasDrilledSinceStaysDrilledWhenTakenBack) {
@@ -134,7 +221,9 @@ TEST(World, PlatesJoinPiecesAndADistractorOpens) {
   ASSERT_TRUE(w.act(SceneAction::attach(distractor, on_top, 0, 1)).done);
   ASSERT_TRUE(w.act(SceneAction::open(1, 7)).done);
   EXPECT_NEAR(w.bodies()[1].world_from_body.shift_mm.x, 7, 1e-12);
-  ASSERT_TRUE(w.act(SceneAction::open(1, 99)).done);
+  const auto too_far = w.act(SceneAction::open(1, 99));
+  ASSERT_TRUE(too_far.done);
+  EXPECT_EQ(too_far.message, "opened to 20 mm: it goes no further");
   EXPECT_NEAR(w.bodies()[1].world_from_body.shift_mm.x, 20, 1e-12);
   ASSERT_TRUE(w.act(SceneAction::open(1, 6)).done);
   // Another plate across the gap holds it; then moving one moves both.
@@ -171,6 +260,41 @@ TEST(World, RefusesWhatMakesNoSense) {
     EXPECT_FALSE(e.message.empty());
   }
   EXPECT_EQ(w.hash(), before);
+}
+
+TEST(World, APlateIsFixedOnlyWhereBoneIsBelowIt) {
+  World w(bar(0.5, 0));
+  w.act(SceneAction::saw(kMiddle));
+  w.act(SceneAction::split(1));
+  const auto mini = static_cast<std::uint32_t>(plate_index("midface-4"));
+  const std::string before = w.hash();
+  const auto refused = [&](const RigidTransform& pose, std::uint32_t body, std::uint32_t other = SceneAction::kNobody) {
+    const auto e = w.act(SceneAction::attach(mini, pose, body, other));
+    return e.done ? std::string("fixed") : e.message;
+  };
+  EXPECT_NE(refused({{}, {900, 0, 4}}, 0).find("not on piece 0"), std::string::npos);
+  EXPECT_NE(refused({{}, {2, 0, 9.5}}, 0, 1).find("not on piece 0"), std::string::npos);   // 5.5 mm above
+  EXPECT_NE(refused({{}, {-11, 0, 4}}, 1).find("not on piece 1"), std::string::npos);      // on the other piece
+  EXPECT_NE(refused({{}, {-11, 0, 4}}, 0, 1).find("not on piece 1"), std::string::npos);
+  EXPECT_NE(refused(RigidTransform{{}, {2, 0, 6}} * rotation_about({}, {1, 0, 0}, std::numbers::pi), 0).find("not on"), std::string::npos);  // its back to the bone
+  EXPECT_EQ(w.fixtures().size(), 0u);
+  EXPECT_EQ(w.hash(), before);
+  EXPECT_EQ(refused({{}, {2, 0, 8.5}}, 0, 1), "fixed");  // 4.5 mm above
+  // Where a piece lies now counts, not where it was cut.
+  w.act(SceneAction::plain(ActionKind::undo));
+  w.act(SceneAction::move(1, {{}, {0, 100, 0}}));
+  EXPECT_NE(refused({{}, {2, 0, 4}}, 0, 1).find("not on piece 1"), std::string::npos);
+  EXPECT_EQ(refused({{}, {9, 100, 4}}, 1), "fixed");
+}
+
+TEST(World, SuckerAndWaterReachAsFarAsMakesSense) {
+  World w(bar(1, 0));
+  for (const double r : {0.0, -3.0, 150.0, 1500.0}) {
+    EXPECT_FALSE(w.act(SceneAction::suction({}, r, 60)).done) << r;
+    EXPECT_FALSE(w.act(SceneAction::irrigate({}, r, 0.5)).done) << r;
+  }
+  EXPECT_TRUE(w.act(SceneAction::suction({}, SceneAction::kMostReachMm, 60)).done);
+  EXPECT_TRUE(w.act(SceneAction::suction({}, 0, 0)).done);  // away
 }
 
 TEST(World, CrumbsBecomeDustAndNothingIsLost) {
@@ -283,10 +407,49 @@ TEST(World, ARegionOfInterestTakesThePlaceOfTheCoarseBone) {
   EXPECT_FALSE(w.act(SceneAction::split(1)).done);
   w.act(SceneAction::move(0, RigidTransform{{}, {1, 2, 3}}));
   EXPECT_EQ(w.bodies()[1].world_from_body.shift_mm, (Vec3{1, 2, 3}));
+  const auto refused = [&](World& bad, const Frame& frame) -> std::string {
+    const std::string before = bad.hash();
+    try {
+      bad.add_region(BrickGrid(frame, bricks));
+    } catch (const Error& e) {
+      EXPECT_EQ(bad.hash(), before);
+      EXPECT_EQ(e.code(), ExitCode::usage);
+      return e.what();
+    }
+    return "taken";
+  };
+  // A coarse voxel is 0.5 mm: whole ones and a hundredth off are taken, two hundredths and more are not, along each axis and either way.
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (const double share : {-0.4, -0.02, 0.02, 0.1, 0.4, 0.5}) {
+      World bad(BrickGrid(coarse), nullptr);
+      Frame off = f;
+      off.origin_mm[a] += share * 0.5;
+      EXPECT_NE(refused(bad, off).find("cuts through voxels"), std::string::npos) << a << ' ' << share;
+    }
+    for (const double share : {-0.005, 0.005, 1.0, -3.0}) {
+      World good(BrickGrid(coarse), nullptr);
+      Frame on = f;
+      on.origin_mm[a] += share * 0.5;
+      EXPECT_EQ(refused(good, on), "taken") << a << ' ' << share;
+    }
+    // One face on voxels, the other not.
+    World bad(BrickGrid(coarse), nullptr);
+    Frame longer = f;
+    longer.dims[a] += 1;
+    EXPECT_NE(refused(bad, longer).find("cuts through voxels"), std::string::npos);
+  }
   World bad(BrickGrid(coarse), nullptr);
-  Frame off = f;
-  off.origin_mm.x += 0.13;
-  EXPECT_ANY_THROW(bad.add_region(BrickGrid(off, bricks)));
+  Frame turned = f;
+  turned.direction = rotation_about({}, {0, 0, 1}, 0.01).rotation;
+  EXPECT_NE(refused(bad, turned).find("axes"), std::string::npos);
+  EXPECT_NE(refused(w, f).find("there is one already"), std::string::npos);
+  WorldProbe::next_brick(bad) = BrickGrid::kMostBricks - 124;
+  try {
+    bad.add_region(BrickGrid(f, bricks));
+    FAIL() << "names given twice";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::resources);
+  }
 }
 
 }  // namespace

@@ -430,7 +430,7 @@ TEST(Hardness, FollowsItsLaw) {
 TEST(Hardness, TheFileIsCheckedWithKeyAndLine) {
   const auto refused = [](const std::string& text, const std::string& part) {
     try {
-      static_cast<void>(parse_hardness(text, "'h.json'"));
+      static_cast<void>(parse_hardness(text, "h.json"));
       ADD_FAILURE() << "taken: " << text;
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ExitCode::usage);
@@ -439,8 +439,8 @@ TEST(Hardness, TheFileIsCheckedWithKeyAndLine) {
     }
   };
   refused("{", "line 1");
-  refused("[]", "must be 1");
-  refused(R"({"osteotome_hardness": 2})", "must be 1");
+  refused("[]", "object");
+  refused(R"({"osteotome_hardness": 2})", "osteotome_hardness");
   refused("{\"osteotome_hardness\": 1,\n \"exponnet\": 1}", "line 2");
   refused("{\"osteotome_hardness\": 1,\n \"exponnet\": 1}", "did you mean \"exponent\"");
   refused("{\"osteotome_hardness\": 1,\n\n \"exponent\": 9}", "line 3");

@@ -120,7 +120,7 @@ TEST(Operation, NothingIsRemovedWhileTheSceneIsPrepared) {
       if (session.actions[next].action.is(ActionKind::hold))
         held = true;
       else if (session.actions[next].action.is(ActionKind::saw) || session.actions[next].action.is(ActionKind::split) ||
-               session.actions[next].action.is(ActionKind::undo))
+               session.actions[next].action.is(ActionKind::undo) || session.actions[next].action.is(ActionKind::attach))
         held = false;
     }
     EXPECT_EQ((t.flags & kHeld) != 0, held) << t.tick;

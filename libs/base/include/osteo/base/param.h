@@ -19,6 +19,7 @@ struct FieldDoc {
   std::string_view unit = {};  ///< "HU", "mm", ... or empty
   double lo = -std::numeric_limits<double>::infinity();
   double hi = std::numeric_limits<double>::infinity();
+  bool needed = false;  ///< in files: there is no default
 };
 
 /// Specialise for each enum used as a parameter: `static constexpr std::array<std::string_view, N> values`, in enum order.
@@ -32,14 +33,15 @@ struct FieldRef {
     int* index;  ///< enum with int as underlying type
     std::span<const std::string_view> names;
   };
-  using Target = std::variant<bool*, int*, double*, std::string*, std::array<double, 3>*, Choice>;
+  using Target = std::variant<bool*, int*, double*, std::string*, std::array<double, 3>*, std::vector<int>*, Choice>;
 
   FieldDoc doc;
   Target target;
 
-  [[nodiscard]] std::string_view kind() const;  ///< "flag", "int", "number", "text", "triple" or "choice"
+  [[nodiscard]] std::string_view kind() const;  ///< "flag", "int", "number", "text", "triple", "list" or "choice"
   [[nodiscard]] std::string to_text() const;    ///< round-trips through from_text
-  void from_text(std::string_view text) const;  ///< throws Error(usage) that names the field, the range and the choices
+  /// Throws Error(usage) that names the field (as its flag, unless it is `called` otherwise), the range and the choices.
+  void from_text(std::string_view text, std::string_view called = {}) const;
   [[nodiscard]] std::string flag() const;       ///< "--half-width"
 };
 

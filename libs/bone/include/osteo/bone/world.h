@@ -37,6 +37,8 @@ enum class ActionKind : std::uint32_t {
 /// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
+  static constexpr double kMostReachMm = 50;   ///< of a sucker and of water
+  static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
 
   std::uint64_t tick = 0;
   std::uint32_t kind = 0;         ///< ActionKind
@@ -94,10 +96,11 @@ struct Fixture {
 /// density changes it puts a new one in its place, so that whoever still reads the old is not disturbed.
 class World {
  public:
-  /// Names are 32 bits wide: room for 8 million bricks.
+  /// Names are 32 bits wide: room for BrickGrid::kMostBricks over all that the scene ever held; names are not given twice.
   explicit World(BrickGrid bone, std::shared_ptr<const Hardness> hardness = nullptr);
   /// A part of the first body in finer voxels: in its box the coarse bone is taken out, so that each place belongs to one of them. A world
-  /// with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along faces of the first body's voxels.
+  /// with a region is sawn and moved, but not taken apart. Error(usage) unless its box lies along faces of the first body's voxels (to
+  /// a hundredth); Error(resources) where names run out.
   void add_region(BrickGrid fine, std::shared_ptr<const Hardness> hardness = nullptr);
 
   /// With bodies of its own (a copy by value would share them).
@@ -120,7 +123,7 @@ class World {
 
   struct Effect {
     bool done = true;
-    std::string message;  ///< why nothing was done
+    std::string message;  ///< why nothing was done, or not what was asked for
     /// Bodies with the same id, of which these bricks differ (a new grid took the old one's place).
     struct Changed {
       std::uint32_t body;
@@ -136,7 +139,7 @@ class World {
     std::vector<std::uint32_t> gone;
     std::vector<std::pair<VoxelKey, float>> dust;  ///< names of voxels and the density that became dust there
   };
-  /// Cost: moves and plates nothing; saw and split a copy of each bone they change. `components` of a body (by id), up to date; where it is
+  /// Cost: moves nothing; plates under a millisecond; saw and split a copy of each bone they change. `components` of a body (by id), up to date; where it is
   /// empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing changed.
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
@@ -158,6 +161,7 @@ class World {
   // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since stays drilled.
   struct Done {
     ActionKind kind;
+    std::uint32_t of = 0;  // move: the piece; open: the fixture
     std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
     std::vector<Fixture> fixtures;
     std::vector<std::pair<std::uint32_t, std::vector<Change>>> sawn;
@@ -167,12 +171,15 @@ class World {
   World(const World&) = default;  // shares bodies
   PlacedBody* placed(std::uint32_t body);
   [[nodiscard]] std::vector<std::uint32_t> joined_to(std::uint32_t body, std::uint32_t except_fixture) const;
+  [[nodiscard]] std::uint32_t not_under_plate(const SceneAction& attach) const;
   void move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by);
-  [[nodiscard]] Done snapshot(ActionKind kind) const;
+  [[nodiscard]] Done snapshot(ActionKind kind, std::uint32_t of = 0) const;
   void remember(Done done);
   Effect saw(const SceneAction& a);
   Effect split(const SceneAction& a, const ComponentsOf& components);
   Effect undo();
+
+  friend struct WorldProbe;  // tests of a scene whose names run out
 
   std::vector<PlacedBody> bodies_;
   std::vector<Fixture> fixtures_;

@@ -31,7 +31,7 @@ struct Frame {
   friend bool operator==(const Frame&, const Frame&) = default;
 };
 
-/// Throws Error(corrupt) that says what is wrong: no voxels, spacing not positive and finite, direction not orthonormal
+/// Throws Error(corrupt) that says what is wrong: no voxels, more than 1e18, spacing not positive and finite, direction not orthonormal
 /// (beyond 1e-3; smaller deviations are accepted).
 void require_valid(const Frame& frame);
 

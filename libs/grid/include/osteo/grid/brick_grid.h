@@ -22,6 +22,8 @@ struct Ijk {
 using VoxelKey = std::uint32_t;
 
 /// The set of bricks is fixed when the grid is made; values may change. A voxel outside every brick reads as 0.
+/// Limits: kMostBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMostCells bricks (a table of 0.5 GB:
+/// 0.2 mm over 820 mm each way).
 /// One thread writes (`set`), others may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old
 /// or new values, never torn ones.
 /// Memory: 4 bytes a voxel of each brick, plus 4 bytes for each brick of the bounding box.
@@ -30,9 +32,12 @@ class BrickGrid {
   static constexpr int kEdge = 8;
   static constexpr int kVoxels = kEdge * kEdge * kEdge;
   static constexpr std::uint32_t kNone = 0xffffffffU;
+  static constexpr std::uint32_t kMostBricks = (1U << 23) - 1;  ///< one less than there are numbers: kNone is the last voxel's name
+  static constexpr std::uint64_t kMostCells = 1ULL << 27;
 
   BrickGrid() = default;
   /// All-zero bricks at the given brick coordinates (>= 0, each at most once, any order; they are sorted z, y, x).
+  /// Error(corrupt) where they are beyond the limits.
   BrickGrid(Frame frame, std::vector<Ijk> bricks);
   BrickGrid(const BrickGrid& other);
   BrickGrid(BrickGrid&&) noexcept = default;
@@ -91,7 +96,17 @@ class BrickGrid {
   std::unique_ptr<float[]> values_;
 };
 
-/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels).
+/// Whether so many bricks, or bricks within a box of so many along each axis, are more than a BrickGrid takes.
+[[nodiscard]] constexpr bool too_many_bricks(std::uint64_t bricks) {
+  return bricks > BrickGrid::kMostBricks;
+}
+[[nodiscard]] constexpr bool too_wide_for_bricks(std::array<std::uint64_t, 3> n) {
+  // Without overflow: no axis alone may be longer than the whole.
+  constexpr std::uint64_t most = BrickGrid::kMostCells;
+  return n[0] > most || n[1] > most || n[2] > most || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
+}
+/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt) where the grid is beyond
+/// the limits of a BrickGrid.
 [[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid, bool all = false);
 /// Bricks with only zeros are left out; equal values come back bit for bit.
 [[nodiscard]] SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name);

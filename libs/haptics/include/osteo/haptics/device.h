@@ -1,5 +1,7 @@
 // Devices: where the hand is, and what it feels.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -75,6 +77,7 @@ struct Script {
   struct Deed {
     double t_s = 0;
     SceneAction action;
+    [[nodiscard]] std::uint64_t tick(double rate_hz) const { return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * rate_hz)); }
   };
   struct Camera {
     Vec3 centre_mm;
@@ -83,20 +86,28 @@ struct Script {
   };
   std::optional<Camera> camera;  ///< for its pictures; absent: from where the drill comes, around its strokes
   std::vector<Deed> deeds;       ///< what else is done, times rising
-  [[nodiscard]] double seconds() const { return waypoints.empty() ? 0 : waypoints.back().t_s; }
+  /// Until the last waypoint, or the last deed where that is later.
+  [[nodiscard]] double seconds() const {
+    return std::max(waypoints.empty() ? 0 : waypoints.back().t_s, deeds.empty() ? 0 : deeds.back().t_s);
+  }
 };
 
-/// Follows a script by tick number, not by the clock: the same ticks on every run.
+/// Follows a script by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand rests there, the drill
+/// off, until the tick of the last deed has been.
 class ScriptedDevice final : public Device {
  public:
-  ScriptedDevice(Script script, double rate_hz) : script_(std::move(script)), rate_hz_(rate_hz) {}
+  ScriptedDevice(Script script, double rate_hz)
+      : script_(std::move(script)), rate_hz_(rate_hz), deeds_end_(script_.deeds.empty() ? 0 : script_.deeds.back().tick(rate_hz) + 1) {}
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
-  [[nodiscard]] bool active(std::uint64_t tick) const noexcept override { return static_cast<double>(tick) / rate_hz_ < script_.seconds(); }
+  [[nodiscard]] bool active(std::uint64_t tick) const noexcept override {
+    return static_cast<double>(tick) / rate_hz_ < script_.waypoints.back().t_s || tick < deeds_end_;
+  }
 
  private:
   Script script_;
   double rate_hz_;
+  std::uint64_t deeds_end_;
   std::size_t leg_ = 0;
   SpringHand hand_;
 };

@@ -56,6 +56,8 @@ class Follower {
   [[nodiscard]] const std::set<std::uint8_t>& burrs_used() const { return burrs_used_; }
   /// Ticks in which bone was left that might have gone (kNoRoom).
   [[nodiscard]] std::uint64_t ticks_without_room() const { return ticks_without_room_; }
+  /// Ticks in which the device gave no pose that could be used.
+  [[nodiscard]] std::uint64_t unusable_poses() const { return unusable_poses_; }
 
  private:
   struct Followed {
@@ -116,6 +118,7 @@ class Follower {
   std::size_t happened_before_ = 0;  // actions whose turn comes still, and that have happened to the dust while catching up
   std::set<std::uint8_t> burrs_used_;
   std::uint64_t ticks_without_room_ = 0;
+  std::uint64_t unusable_poses_ = 0;
 };
 
 }  // namespace osteo

@@ -1,5 +1,6 @@
 // A rehearsal put together: world, device, servo, and the readers of its stream.
 #pragma once
+#include <algorithm>
 #include <deque>
 #include <exception>
 #include <filesystem>
@@ -28,6 +29,15 @@ struct RehearsalOptions {
   std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
 };
 
+/// An action that was refused, or done otherwise than asked.
+struct ActionNote {
+  std::uint64_t tick = 0;
+  ActionKind kind{};
+  bool done = false;
+  std::string why;
+  std::uint64_t times = 1;  ///< in a row
+};
+
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;  ///< by the burr
@@ -47,6 +57,11 @@ struct RehearsalSummary {
   std::vector<Fixture> fixtures;
   std::optional<LoopStats> loop;  ///< only when it ran by the clock
   std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
+  std::vector<ActionNote> notes;
+  std::uint64_t unusable_poses = 0;   ///< ticks in which the device gave none that could be used
+  [[nodiscard]] bool refused() const {
+    return std::any_of(notes.begin(), notes.end(), [](const ActionNote& n) { return !n.done; });
+  }
 };
 
 /// Owns the world while it runs. The servo thread writes densities; the recorder, the follower and whoever asks for a reader are told
@@ -122,6 +137,7 @@ class Rehearsal {
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
+  std::vector<ActionNote> notes_;
   std::uint64_t soft_tick_ = 0;  // of the next update of soft tissue
   std::atomic<bool> stop_{false};
   std::exception_ptr failure_;  // of the follower's thread, or of what ran in this one
@@ -151,6 +167,10 @@ struct ReplayResult {
 [[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context);
 /// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given. Error(corrupt).
 void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
+
+/// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look like metres, a sucker
+/// or water where there is no dust.
+[[nodiscard]] std::vector<std::string> doubts_about(const Script& script, const World& world, bool dust);
 
 /// A drilling that fits most heads: from behind and below the middle of the bone outwards to the patient's left (or right)
 /// until the outside is reached, there a cavity in circles, deeper with time. Error(failed) when no bone is met.
