@@ -10,8 +10,8 @@ constexpr double kMassKg = 0.15, kSpringNPerMm = 0.8, kMaxHandN = 6;
 
 // Of a hand that is led: near bone a pull of 0.64 N at most, less where it touches.
 constexpr double kNearMmPerS = 30, kFreeMmPerS = 200, kRadPerS = 4;
-constexpr double kNearAheadMm = 0.8, kFreeAheadMm = 8, kTouchN = 0.1, kTouchAheadMm = 0.4;
-constexpr double kThereMm = 0.1, kPatienceS = 1;
+constexpr double kNearAheadMm = 0.8, kFreeAheadMm = 8, kTouchN = 0.1, kTouchAheadMm = 0.6;
+constexpr double kThereMm = 0.3, kPatienceS = 1, kQuietS = 0.03;
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void GuidedHand::begin(const HandGoal& goal) noexcept {
   const HandWay& way = now_.way;
   leading_ = true;
   leg_ = 0;
-  share_ = waited_s_ = 0;
+  share_ = waited_s_ = quiet_s_ = 0;
   hand_.start(goal.position_mm);
   from_mm_ = hand_.position_mm();
   from_axis_ = from_floats(goal.axis);
@@ -73,7 +73,12 @@ DeviceSample GuidedHand::step(HandGoal& goal, double dt_s, Vec3 force_n) noexcep
   // While it is being written, the next tick will do.
   if (given_.load(std::memory_order_acquire) != now_.number && given_way_.try_load(now_)) begin(goal);
   if (leading_) {
-    if (leg_ < now_.way.count) {
+    if (now_.way.count == 0) {
+      // Without a pull bone pushes it out.
+      goal.position_mm = hand_.position_mm();
+      waited_s_ += dt_s;
+      quiet_s_ = length(force_n) < kTouchN ? quiet_s_ + dt_s : 0;
+    } else if (leg_ < now_.way.count) {
       const HandWay::Point& to = now_.way.points[leg_];
       const Vec3 along = to.at_mm - from_mm_, to_axis = from_floats(to.axis);
       const double turn = std::acos(std::clamp(dot(from_axis_, to_axis), -1.0, 1.0));
@@ -98,7 +103,9 @@ DeviceSample GuidedHand::step(HandGoal& goal, double dt_s, Vec3 force_n) noexcep
       }
     }
     goal.drill_on = 0;
-    if (waited_s_ > kPatienceS) {
+    if (now_.way.count == 0) {
+      if (quiet_s_ > kQuietS || waited_s_ > kPatienceS) end(false);
+    } else if (waited_s_ > kPatienceS) {
       goal.position_mm = hand_.position_mm();
       end(true);
     } else if (leg_ >= now_.way.count) {

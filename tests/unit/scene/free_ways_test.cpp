@@ -140,15 +140,16 @@ void from_six_views(const char* name, const World& world) {
       const Vec3 aim = ways.centre_mm() + view.right() * (across * ways.radius_mm()) + view.up() * (up * ways.radius_mm());
       const auto at = seen(world, eye, normalized(aim - eye), 8 * ways.radius_mm());
       if (!at) continue;
+      EXPECT_EQ(hand.walk({}), Led::arrived);
       const auto began = std::chrono::steady_clock::now();
-      const FreeWays::Approach a = ways.approach(hand.shown(), *at, normalized(aim - eye), view.axis());
+      const FreeWays::Approach a = ways.approach(hand.pose(), *at, normalized(aim - eye), view.axis());
       plan_s = std::max(plan_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
       const double from_s = hand.seconds();
       EXPECT_EQ(hand.walk(a.way), Led::arrived) << name << ", " << view.name << " " << across;
       longest_s = std::max(longest_s, hand.seconds() - from_s);
       EXPECT_LT(hand.most_n(), 1.0) << name << ", " << view.name << " " << across;
       EXPECT_FALSE(hand.drilled());
-      EXPECT_LT(length(hand.pose().at_mm - a.end.at_mm), 0.2);
+      EXPECT_LT(length(hand.pose().at_mm - a.end.at_mm), 0.4);
       most_n = std::max(most_n, hand.most_n());
       farthest = std::max(farthest, length(a.end.at_mm - *at) - 2);
       put += a.way.put ? 1 : 0;
@@ -161,7 +162,8 @@ void from_six_views(const char* name, const World& world) {
   EXPECT_GE(walked, 12) << name;
   // Whatever the hand is in, it gets out.
   const View& last = kViews[5];
-  const HandWay out = ways.way(hand.shown(), ways.waiting(normalized(last.eye), last.axis()));
+  hand.walk({});
+  const HandWay out = ways.way(hand.pose(), ways.waiting(normalized(last.eye), last.axis()));
   EXPECT_EQ(hand.walk(out), Led::arrived) << name;
   EXPECT_EQ(hand.force_n(), 0);
   std::printf("%s: %d ways from six views, %d put; most force %.3f N, least gap within %.1f mm of the bone seen, longest %.1f s, found in at most %.2f s\n",
@@ -215,7 +217,7 @@ TEST(FreeWays, BackThroughATunnel) {
   EXPECT_EQ(hand.walk(way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
   // And in again, to the floor of the tunnel's far end, which only a slanting look can see: as near as it gets, never harder.
-  const FreeWays::Approach a = ways.approach(hand.shown(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
+  const FreeWays::Approach a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
 }
@@ -227,7 +229,7 @@ TEST(FreeWays, OutOfAClosedShellItIsPut) {
   // The shaft sticks in the shell: jammed, as the drill was that began at the origin.
   Hand hand(world, {{0, 0, 0}, normalized({0.6, 0.4, 0.6})});
   for (int t = 0; t < 1000; ++t) hand.tick();
-  const FreeWays::Approach a = ways.approach(hand.shown(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
+  const FreeWays::Approach a = ways.approach(hand.pose(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
   EXPECT_TRUE(a.way.put);
   const double jammed_n = hand.force_n();
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
@@ -245,7 +247,8 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
   EXPECT_GT(hand.force_n(), 1.0);
   EXPECT_GT(hand.removed_mm3(), 5);
   const double before = hand.force_n();
-  hand.device().lead(ways.way(hand.shown(), ways.waiting({0, 0, 1}, axis)));
+  hand.walk({});
+  hand.device().lead(ways.way(hand.pose(), ways.waiting({0, 0, 1}, axis)));
   double last = before, removed = hand.removed_mm3();
   hand.tick();
   for (int t = 0; hand.device().led() == Led::on_the_way && t < 20000; ++t) {

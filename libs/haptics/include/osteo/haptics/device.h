@@ -20,7 +20,7 @@ struct HandWay {
     bool near_bone = false;  ///< on the way here bone is near: slowly, and with hardly any pull
   };
   std::array<Point, kMost> points;
-  std::uint32_t count = 0;  ///< 0: nowhere
+  std::uint32_t count = 0;  ///< 0: it only lets go, until bone has pushed it out
   bool put = false;         ///< no free way leads to the first point: the tool is taken away and put there
 };
 
@@ -100,7 +100,7 @@ class GuidedHand {
   Numbered now_;
   bool leading_ = false;
   std::uint32_t leg_ = 0;
-  double share_ = 0, waited_s_ = 0;
+  double share_ = 0, waited_s_ = 0, quiet_s_ = 0;
   Vec3 from_mm_, from_axis_;
   SpringHand hand_;
 };

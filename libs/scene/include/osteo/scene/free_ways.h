@@ -69,7 +69,7 @@ class FreeWays {
   [[nodiscard]] std::optional<Poses> straight_out(const HandPose& from, Vec3 rather) const;
   [[nodiscard]] std::optional<Poses> way_out(const HandPose& from, Vec3 rather) const;
   [[nodiscard]] bool leaves(const HandPose& from, Vec3 direction, double near_margin_mm, double margin_mm, HandPose& end) const;
-  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double margin_mm) const;
+  [[nodiscard]] std::optional<Poses> search_out(const HandPose& from, double near_margin_mm, double far_margin_mm) const;
   [[nodiscard]] std::optional<Poses> across(const HandPose& from, const HandPose& to) const;
   [[nodiscard]] std::optional<Poses> over(const HandPose& from, const HandPose& to, Vec3 lift) const;
   [[nodiscard]] bool free_leg(const HandPose& a, const HandPose& b, double margin_mm) const;
