@@ -18,9 +18,9 @@ namespace {
 
 std::atomic<bool> g_cancel{false};
 
-extern "C" void on_signal(int) {
-  // The first asks the work to stop and clean up; a second ends the program at once.
-  if (g_cancel.exchange(true)) ::_exit(130);
+extern "C" void on_signal(int signal) {
+  // The first asks the work to stop and clean up; a second Ctrl-C ends the program at once. A logout may send SIGTERM and SIGHUP together.
+  if (g_cancel.exchange(true) && signal == SIGINT) ::_exit(130);
 }
 
 struct Parsed {
@@ -265,6 +265,9 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   action.sa_handler = on_signal;
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  // Ignored already: by nohup.
+  struct sigaction hangup {};
+  if (::sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
   ::signal(SIGXFSZ, SIG_IGN);
   std::unique_ptr<ProgressPrinter> printer;
   try {
