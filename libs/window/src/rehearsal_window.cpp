@@ -340,7 +340,7 @@ class RehearsalWindow {
         const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
         char far[80];
         std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
-        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there" : gap > 3 ? far : "drill brought to the bone";
+        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there" : gap > 6 ? far : "drill brought to the bone";
         go(Leading::Stage::on_the_way, a.way, a.end);
       } else {
         const HandPose to = waiting(ways);
@@ -741,9 +741,10 @@ class RehearsalWindow {
     draw_status(rehearsal, tick);
     ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
-    if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
     if (ImGui::Button("Lift the drill out (U)", {-1, 0})) lead(rehearsal, std::nullopt, {});
+    if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
     const bool saves = ImGui::Button("Save and go on (F5)", {-1, 0});
+    ImGui::Dummy({0, 6});
     const bool resets = ImGui::Button("Reset the bone (R)", {-1, 0});
     ImGui::Separator();
     ImGui::Text("Look from");
