@@ -257,6 +257,11 @@ class RehearsalWindow {
     return {from_floats(tick.device.position_mm), from_floats(tick.device.axis)};
   }
 
+  [[nodiscard]] bool outside(Rehearsal& rehearsal) const {
+    const FreeWays ways = free_ways(rehearsal, true);
+    return length(hand_pose(rehearsal).at_mm - ways.centre_mm()) > ways.radius_mm();
+  }
+
   [[nodiscard]] FreeWays free_ways(Rehearsal& rehearsal, bool whole_tool) const {
     const auto drill = static_cast<std::size_t>(tool_);
     ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
@@ -298,7 +303,7 @@ class RehearsalWindow {
 
   void lead(Rehearsal& rehearsal, std::optional<Vec3> seen_mm, Vec3 forward) {
     if (!rehearsal.device().lead({})) {
-      say("the drill is in your hand: lift it yourself");
+      say("the drill is in your own hand");
       return;
     }
     leading_ = Leading{Leading::Stage::letting_go, seen_mm, forward, {}};
@@ -438,6 +443,15 @@ class RehearsalWindow {
     Rehearsal& now = *actions_.rehearsal();
     cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) draw_help(show_help_, width_);
+    if (const std::string trouble = actions_.trouble(); !trouble.empty()) {
+      ImGui::SetNextWindowPos({kPanelWidth + 10, 10});
+      ImGui::SetNextWindowSize({static_cast<float>(std::max(200, width_ - kPanelWidth - kSliceWidth - 20)), 0});
+      ImGui::Begin("trouble", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs);
+      ImGui::PushStyleColor(ImGuiCol_Text, ImVec4(1.0F, 0.45F, 0.35F, 1));
+      ImGui::TextWrapped("%s", trouble.c_str());
+      ImGui::PopStyleColor();
+      ImGui::End();
+    }
     now.look([&](const World& world, Follower& follower) {
       world_view_->update(world, follower);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
@@ -581,6 +595,10 @@ class RehearsalWindow {
       if (failure_) return;
     }
     Rehearsal& now = *actions_.rehearsal();  // F5 and R make another
+    // Who takes up the saw or a piece lets go of the drill: it does not stay in the bone.
+    const bool in_hand = tools_->in_hand();
+    if (in_hand_ && !in_hand && !leading_ && !outside(now)) lead(now, std::nullopt, {});
+    in_hand_ = in_hand;
     go_on_leading(now);
     send_goal(now, static_cast<double>(io.DeltaTime));
   }
@@ -716,12 +734,6 @@ class RehearsalWindow {
     ImGui::SetNextWindowPos({0, 0});
     ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
     ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-    if (const std::string trouble = actions_.trouble(); !trouble.empty()) {
-      ImGui::PushStyleColor(ImGuiCol_Text, ImVec4(1.0F, 0.45F, 0.35F, 1));
-      ImGui::TextWrapped("%s", trouble.c_str());
-      ImGui::PopStyleColor();
-      ImGui::Separator();
-    }
     ImGui::Text("Burr");
     const Burr& burr = burr_library()[static_cast<std::size_t>(tool_)];
     if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) set_kind(BurrKind::cutting);
@@ -738,8 +750,6 @@ class RehearsalWindow {
     ImGui::Separator();
     tools_->panel(rehearsal, view_axes());
     ImGui::Separator();
-    draw_status(rehearsal, tick);
-    ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
     if (ImGui::Button("Lift the drill out (U)", {-1, 0})) lead(rehearsal, std::nullopt, {});
     if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
@@ -755,6 +765,8 @@ class RehearsalWindow {
     if (ImGui::Button("front")) look_from({0, -1, 0.1});
     ImGui::SameLine();
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
+    ImGui::Separator();
+    draw_status(rehearsal, tick);  // below the buttons, which its lines would move
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
@@ -839,7 +851,7 @@ class RehearsalWindow {
   std::string device_name_;
   int gl_errors_ = 0;
   std::uint64_t pictures_ = 0;
-  bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false;
+  bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false, in_hand_ = true;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
   std::string message_;
