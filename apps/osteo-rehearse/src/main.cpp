@@ -133,6 +133,12 @@ class Sitting {
   std::unique_ptr<Rehearsal> rehearsal_;
 };
 
+template <class R>
+std::string trouble_of(const R& rehearsal) {
+  if constexpr (requires { rehearsal.trouble(); }) return rehearsal.trouble();
+  return {};
+}
+
 // When the display goes away Xlib ends the program, by exit(): the session is closed first.
 Sitting* g_sitting = nullptr;
 
@@ -183,7 +189,7 @@ struct WindowCommand {
     actions.save = [&] { sitting.save(); };
     actions.rehearsal = [&] { return sitting.rehearsal(); };
     actions.folder = [&] { return sitting.folder(); };
-    actions.trouble = [&] { return std::string(); };
+    actions.trouble = [&] { return trouble_of(*sitting.rehearsal()); };
     actions.stop = [&] { return io.context.cancelled(); };
     g_sitting = &sitting;
     std::atexit(close_at_exit);

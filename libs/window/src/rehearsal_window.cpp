@@ -281,7 +281,10 @@ class RehearsalWindow {
   void send_goal(Rehearsal& rehearsal, double seconds) {
     Device& device = rehearsal.device();
     device.set_tool(static_cast<std::uint8_t>(tool_));
-    if (leading_) return;
+    if (leading_) {
+      drill_latched_ = false;
+      return;
+    }
     auto* const mouse = dynamic_cast<MouseDevice*>(&device);
     if (mouse == nullptr) return;  // it moves and drills by itself
     turn_handle(rehearsal, seconds);
@@ -296,7 +299,8 @@ class RehearsalWindow {
   // First it lets go of the bone; then the way is found from where it is.
   struct Leading {
     enum class Stage { letting_go, on_the_way, put } stage = Stage::letting_go;
-    std::optional<Vec3> seen_mm;  // bone to come down at; none: out
+    std::optional<std::uint64_t> quiet_tick;  // when it had let go: what is known of the hand may be older
+    std::optional<Vec3> seen_mm;              // bone to come down at; none: out
     Vec3 forward;
     std::string done;
   };
@@ -306,7 +310,7 @@ class RehearsalWindow {
       say("the drill is in your own hand");
       return;
     }
-    leading_ = Leading{Leading::Stage::letting_go, seen_mm, forward, {}};
+    leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
     drill_latched_ = false;
     wait_for_release_ = true;
   }
@@ -338,6 +342,9 @@ class RehearsalWindow {
     };
     const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
     if (leading_->stage == Leading::Stage::letting_go) {
+      const std::uint64_t tick = rehearsal.latest().tick;
+      if (!leading_->quiet_tick) leading_->quiet_tick = tick;
+      if (tick <= *leading_->quiet_tick) return;
       const FreeWays ways = free_ways(rehearsal, true);
       const HandPose from = hand_pose(rehearsal);
       if (leading_->seen_mm) {

@@ -172,7 +172,7 @@ void from_six_views(const char* name, const World& world) {
 
 TEST(FreeWays, FromSixViewsOnThePhantomsHead) {
   PhantomParams p;
-  p.spacing_mm = 1;
+  p.spacing_mm = 1.5;
   from_six_views("phantom head", world_of(make_phantom(p).ct, 500, 1));
 }
 
