@@ -231,7 +231,12 @@ bool FreeWays::leaves(const HandPose& from, Vec3 direction, double near_margin, 
 std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double near_margin, double far_margin) const {
   constexpr int kMostLooks = 40000;
   constexpr double kBeginningMm = 3;
-  const auto margin = [&](Vec3 at) { return length(at - from.at_mm) < kBeginningMm ? near_margin : far_margin; };
+  // At the beginning the tool may touch, but never more than it does.
+  const std::size_t touched = touching(from, near_margin, tool_.points.size());
+  const auto beginning = [&](Vec3 at) { return length(at - from.at_mm) < kBeginningMm; };
+  const auto fits = [&](const HandPose& p) {
+    return beginning(p.at_mm) ? touching(p, near_margin, touched) <= touched : free(p, far_margin);
+  };
   constexpr int kHalf = 1 << 19;
   const auto name = [](int i, int j, int k) {
     return (static_cast<std::int64_t>(i + kHalf) << 40) | (static_cast<std::int64_t>(j + kHalf) << 20) | (k + kHalf);
@@ -256,7 +261,7 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
       Poses straight;
       for (std::size_t i = 0; i + 1 < path.size();) {
         std::size_t next = path.size() - 1;
-        while (next > i + 1 && !free_leg(path[i], path[next], margin(path[i].at_mm))) next = i + (next - i) / 2;
+        while (next > i + 1 && !free_leg(path[i], path[next], beginning(path[i].at_mm) ? near_margin : far_margin)) next = i + (next - i) / 2;
         straight.push_back(path[next]);
         i = next;
       }
@@ -268,7 +273,7 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
       const std::int64_t there = name(i, j, k);
       if (seen.contains(there) || in_bone(place(there))) continue;
       ++looks;
-      if (!free({place(there), from.axis}, margin(place(there)))) continue;
+      if (!fits({place(there), from.axis})) continue;
       seen.emplace(there, here);
       open.emplace(length(place(there) - centre_mm_), there);
     }
@@ -292,7 +297,6 @@ std::optional<FreeWays::Poses> FreeWays::straight_out(const HandPose& from, Vec3
 std::optional<FreeWays::Poses> FreeWays::way_out(const HandPose& from, Vec3 rather) const {
   if (auto straight = straight_out(from, rather)) return straight;
   const double here = std::min(0.0, margin_at(from));
-  if (!free(from, here)) return std::nullopt;
   auto roomy = search_out(from, here, kClearMm);
   return roomy ? roomy : search_out(from, here, here);
 }

@@ -519,6 +519,7 @@ class RehearsalWindow {
       go_on = go_on || press.command == Command::save;
       anew = anew || press.command == Command::reset;
       quit_ = quit_ || press.command == Command::quit;
+      screenshot_wanted_ = screenshot_wanted_ || press.command == Command::screenshot;
     }
     if ((go_on || anew) && attempt(anew, false)) say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
   }
