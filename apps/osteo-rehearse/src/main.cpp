@@ -133,10 +133,11 @@ class Sitting {
   std::unique_ptr<Rehearsal> rehearsal_;
 };
 
+// Why it cannot be recorded any more.
 template <class R>
-std::string trouble_of(const R& rehearsal) {
-  if constexpr (requires { rehearsal.trouble(); }) return rehearsal.trouble();
-  return {};
+std::optional<Error> failure_of(const R& rehearsal) {
+  if constexpr (requires { rehearsal.recording().failure; }) return rehearsal.recording().failure;
+  return std::nullopt;
 }
 
 // When the display goes away Xlib ends the program, by exit(): the session is closed first.
@@ -189,7 +190,7 @@ struct WindowCommand {
     actions.save = [&] { sitting.save(); };
     actions.rehearsal = [&] { return sitting.rehearsal(); };
     actions.folder = [&] { return sitting.folder(); };
-    actions.trouble = [&] { return trouble_of(*sitting.rehearsal()); };
+    actions.failure = [&] { return failure_of(*sitting.rehearsal()); };
     actions.stop = [&] { return io.context.cancelled(); };
     g_sitting = &sitting;
     std::atexit(close_at_exit);

@@ -202,11 +202,17 @@ class RehearsalWindow {
     return false;
   }
 
-  // A rehearsal that has ended without having been asked to says why when it is closed.
+  // What can no longer be recorded is ended; a rehearsal that has ended without having been asked to says why when it is closed.
   void watch() {
     const Rehearsal* const rehearsal = actions_.rehearsal();
     if (rehearsal == nullptr || failure_) return;
-    if (rehearsal->running()) {
+    if (const std::optional<Error> failed = actions_.failure()) {
+      guarded([&] {
+        actions_.save();
+        throw Error(*failed);
+      });
+      lost_ = failure_;
+    } else if (rehearsal->running()) {
       ran_ = true;
     } else if (ran_) {
       guarded([&] {
@@ -450,15 +456,6 @@ class RehearsalWindow {
     Rehearsal& now = *actions_.rehearsal();
     cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) draw_help(show_help_, width_);
-    if (const std::string trouble = actions_.trouble(); !trouble.empty()) {
-      ImGui::SetNextWindowPos({kPanelWidth + 10, 10});
-      ImGui::SetNextWindowSize({static_cast<float>(std::max(200, width_ - kPanelWidth - kSliceWidth - 20)), 0});
-      ImGui::Begin("trouble", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs);
-      ImGui::PushStyleColor(ImGuiCol_Text, ImVec4(1.0F, 0.45F, 0.35F, 1));
-      ImGui::TextWrapped("%s", trouble.c_str());
-      ImGui::PopStyleColor();
-      ImGui::End();
-    }
     now.look([&](const World& world, Follower& follower) {
       world_view_->update(world, follower);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());

@@ -2,8 +2,10 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
+#include "osteo/base/error.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/scene/rehearsal.h"
@@ -37,8 +39,8 @@ struct WindowActions {
   std::function<Rehearsal*()> rehearsal;
   /// Folder for screenshots of the session that runs now, or ran last.
   std::function<std::filesystem::path()> folder;
-  /// What the panel must say at once about the session that runs; empty: all is well.
-  std::function<std::string()> trouble;
+  /// Why the session that runs has to end now (its recording has): the window saves it and says so.
+  std::function<std::optional<Error>()> failure;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };
