@@ -1,5 +1,9 @@
 // The window of 'osteo rehearse', a program of its own.
+#include <unistd.h>
+
+#include <cstdlib>
 #include <iostream>
+#include <utility>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -7,21 +11,12 @@
 #include "osteo/cli/command.h"
 #include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
+#include "osteo/scene/free_ways.h"
 #include "osteo/scene/session_folder.h"
 #include "osteo/window/rehearsal_window.h"
+#include "window_flags.h"
 
 namespace osteo {
-namespace {
-
-enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics };
-
-}  // namespace
-
-template <>
-struct EnumNames<Hand> {
-  static constexpr std::array<std::string_view, 4> values{"auto", "mouse", "spacemouse", "woodenhaptics"};
-};
-
 namespace {
 
 // What moves the drill: as asked, or the best that is plugged in; with a pedal where there is one.
@@ -39,22 +34,22 @@ class Hands {
     if (hand_ == Hand::automatic) hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
     if (!arm_file.empty()) geometry_ = load_woodenhaptics(arm_file);
   }
-  /// `start_mm`: where the tool is when the device is first heard of.
-  [[nodiscard]] std::unique_ptr<Device> make(Vec3 start_mm, int tool) const {
+  /// `start`: where the hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small.
+  [[nodiscard]] std::unique_ptr<Device> make(const HandGoal& start, Vec3 near_mm) const {
     // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
     if (hand_ == Hand::spacemouse) {
       return std::make_unique<SpaceMouseDevice>(open_first([](const HidInfo& i) {
                                                   const DeviceModel m = model_of(i.vendor, i.product);
                                                   return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
                                                 }),
-                                                start_mm, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, tool, pedal_.get());
+                                                start, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get());
     }
     if (hand_ == Hand::woodenhaptics) {
       return std::make_unique<WoodenHapticsDevice>(
           open_first([](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; }), geometry_,
-          WorkspaceMap(start_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1), tool, pedal_.get());
+          WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1), start.tool, pedal_.get());
     }
-    return std::make_unique<MouseDevice>();
+    return std::make_unique<MouseDevice>(start);
   }
   [[nodiscard]] std::string name() const {
     return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) + (pedal_ ? " and pedal" : "");
@@ -67,49 +62,105 @@ class Hands {
   std::unique_ptr<FootPedal> pedal_;
 };
 
-Vec3 in_front_of(const World& world, int tool) {
+// In front of the bone on the patient's left, or where there is none, where a hand waits.
+Vec3 near_the_bone(const World& world, const HandGoal& start) {
   try {
-    return make_default_script(world, true, tool, 10).waypoints.front().at_mm;
+    return make_default_script(world, true, start.tool, 10).waypoints.front().at_mm;
   } catch (const Error&) {
-    return world.bodies().front().body->bone.frame().centre_mm();  // no bone on the left
+    return start.position_mm;
   }
 }
 
-struct WindowCommand {
-  struct Params {
-    std::string out;
-    BurrKind burr = BurrKind::cutting;
-    double diameter_mm = 4;
-    BurrShape shape = BurrShape::ball;
-    ContactMethod contact = ContactMethod::overlap;
-    std::string settings;
-    Hand device = Hand::automatic;
-    std::string arm;
-    bool dust = false;
-    double rate_hz = 1000;
-    std::string resume;
-    int width = 1360;
-    int height = 860;
-  };
-  static void describe(Params& p, auto& visit) {
-    visit({"out", "folder for the first session (empty: a new one in CASE/sessions)"}, p.out);
-    visit({"burr", "kind of burr at the start"}, p.burr);
-    visit({"diameter_mm", "of the burr at the start", "mm", 1, 7}, p.diameter_mm);
-    visit({"shape", "of the burr at the start"}, p.shape);
-    visit({"contact", "how the burr feels bone"}, p.contact);
-    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
-    visit({"device", "what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
-    visit({"arm", "geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
-    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off (V)"}, p.dust);
-    visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
-    visit({"resume", "go on from the end of this session"}, p.resume);
-    visit({"width", "of the window", "pixels", 640, 8192}, p.width);
-    visit({"height", "of the window", "pixels", 480, 8192}, p.height);
+// One session after another on a case. Between them, and after whatever throws, none runs.
+class Sitting {
+ public:
+  Sitting(const WindowFlags& flags, const Case& the_case, cli::Invocation& io)
+      : case_(the_case), io_(io), hands_(flags.device, flags.arm), next_folder_(flags.out), last_(flags.resume) {
+    options_.rate_hz = flags.rate_hz;
+    options_.follow = {true, true, flags.dust};
+    options_.haptics.params.contact.method = flags.contact;
+    apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
   }
+
+  HandGoal begin(bool from_case, const HandView& view) {
+    rehearsal_.reset();
+    options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
+    if (!io_.common.quiet && !std::exchange(told_, true)) io_.err << told_hardness(options_.anatomy) << std::endl;
+    SessionFolder session{next_folder_, case_.folder, from_case ? std::filesystem::path() : last_};
+    World world = world_at_begin(session, case_, options_.anatomy, io_.context);
+    const HandPose pose = FreeWays(world, skin_of_burr(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+    const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
+    auto device = hands_.make(start, near_the_bone(world, start));
+    options_.haptics.device = device->traits();
+    options_.soft = soft_body_of(case_.folder);
+    // Last, so that what fails before leaves no folder.
+    session_ = create_session_folder(next_folder_, session.case_folder, session.resumed_from);
+    next_folder_.clear();
+    options_.session_file = session_.stream();
+    try {
+      rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(device), options_, io_.context);
+      rehearsal_->start();
+    } catch (...) {
+      rehearsal_.reset();
+      std::error_code ignored;  // nothing was recorded in it
+      std::filesystem::remove_all(session_.folder, ignored);
+      throw;
+    }
+    return start;
+  }
+
+  void save() {
+    if (!rehearsal_) return;
+    // Whatever comes of it, it is over; and what was recorded can be gone on from.
+    const std::unique_ptr<Rehearsal> over = std::move(rehearsal_);
+    last_ = session_.folder;
+    const RehearsalSummary s = over->stop();
+    write_summary(session_, s, options_.rate_hz, "window", options_.anatomy);
+    for (const std::string& w : s.warnings) io_.context.warn(w);
+    if (!io_.common.quiet)
+      io_.err << "session: " << session_.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)" << std::endl;
+  }
+
+  [[nodiscard]] Rehearsal* rehearsal() const { return rehearsal_.get(); }
+  [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
+  [[nodiscard]] std::string device() const { return hands_.name(); }
+
+ private:
+  const Case& case_;
+  cli::Invocation& io_;
+  const Hands hands_;
+  std::filesystem::path next_folder_, last_;
+  RehearsalOptions options_;
+  SessionFolder session_;
+  std::unique_ptr<Rehearsal> rehearsal_;
+  bool told_ = false;
+};
+
+// When the display goes away Xlib ends the program, by exit(): the session is closed first.
+Sitting* g_sitting = nullptr;
+
+void close_at_exit() {
+  if (g_sitting == nullptr) return;
+  int code = static_cast<int>(ExitCode::cancelled);
+  try {
+    std::exchange(g_sitting, nullptr)->save();
+    std::cerr << "osteo: the display is gone; the session is saved" << std::endl;
+  } catch (const Error& e) {
+    std::cerr << "osteo: the display is gone, and " << e.what() << std::endl;
+    code = static_cast<int>(e.code());
+  } catch (...) {
+    code = static_cast<int>(ExitCode::unspecified);
+  }
+  ::_exit(code);
+}
+
+struct WindowCommand {
+  using Params = WindowFlags;
+  static void describe(Params& p, auto& visit) { WindowFlags::describe(p, visit); }
   static cli::CommandInfo info() {
     return {"rehearse",
             "drill the bone of a case in a window",
-            "The same as 'osteo rehearse CASE'.",
+            "What 'osteo rehearse CASE' opens.",
             {{"case", "a folder made by prepare"}},
             "osteo-rehearse CASE"};
   }
@@ -118,61 +169,38 @@ struct WindowCommand {
     const Case the_case = load_case(io.arguments[0]);
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
-    const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
-
-    SessionFolder session;
-    std::unique_ptr<Rehearsal> rehearsal;
-    std::filesystem::path next_folder = p.out, resume_from = p.resume;
-    RehearsalOptions options;
-    options.rate_hz = p.rate_hz;
-    options.follow = {true, true, p.dust};
-    const Hands hands(p.device, p.arm);
-    options.haptics.params.contact.method = p.contact;
-    apply_haptic_settings(the_case.folder, p.settings, options.haptics);
-
-    WindowActions actions;
-    actions.begin = [&](bool from_case) {
-      const std::filesystem::path from = from_case ? std::filesystem::path() : resume_from;
-      session = create_session_folder(std::exchange(next_folder, {}), the_case.folder, from);
-      options.session_file = session.stream();
-      rehearsal.reset();
-      options.anatomy = anatomy_of(the_case, options.haptics, io.context);
-      World world = world_at_begin(session, the_case, options.anatomy, io.context);
-      // In front of the bone on the patient's left, where the window looks.
-      auto device = hands.make(in_front_of(world, tool), tool);
-      options.haptics.device = device->traits();
-      options.soft = soft_body_of(the_case.folder);
-      rehearsal = std::make_unique<Rehearsal>(std::move(world), std::move(device), options, io.context);
-      rehearsal->start();
-    };
-    actions.save = [&] {
-      const RehearsalSummary s = rehearsal->stop();
-      write_summary(session, s, p.rate_hz, "window", options.anatomy);
-      resume_from = session.folder;
-      if (!io.common.quiet)
-        io.err << "session: " << session.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)\n";
-    };
-    actions.rehearsal = [&]() -> Rehearsal& { return *rehearsal; };
-    actions.folder = [&] { return session.folder; };
-
-    actions.begin(p.resume.empty());
-    io.end_progress();
-    if (!io.common.quiet) io.err << told_hardness(options.anatomy) << '\n';
     WindowOptions window;
     window.title = "Osteotome - " + the_case.folder.filename().string();
-    window.tool = tool;
-    window.device = hands.name();
+    window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
+    window.from_case = p.resume.empty();
     window.width = p.width;
     window.height = p.height;
+    window.state_file = p.state_file;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));
+    Sitting sitting(p, the_case, io);
+    window.device = sitting.device();
+    io.end_progress();
+
+    WindowActions actions;
+    actions.begin = [&](bool from_case, const HandView& view) { return sitting.begin(from_case, view); };
+    actions.save = [&] { sitting.save(); };
+    actions.rehearsal = [&] { return sitting.rehearsal(); };
+    actions.folder = [&] { return sitting.folder(); };
+    actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
+    actions.stop = [&] { return io.context.cancelled(); };
+    g_sitting = &sitting;
+    std::atexit(close_at_exit);
     int gl_errors = 0;
     try {
       gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions);
     } catch (...) {
-      actions.save();
+      g_sitting = nullptr;
+      sitting.save();
       throw;
     }
-    actions.save();
+    g_sitting = nullptr;
+    sitting.save();
+    if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; the session is saved");
     if (gl_errors > 0)
       throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen; the session is saved",
                   "please report this with the name of the graphics card");
@@ -192,7 +220,7 @@ int main(int argc, char** argv) {
   std::vector<char*> args{argv[0]};
   static char name[] = "rehearse";
   const std::string_view first = argc > 1 ? argv[1] : "";
-  if (first != "--help" && first != "-h" && first != "--version" && first != "help") args.push_back(name);
+  if (first != "--version" && first != "help") args.push_back(name);
   args.insert(args.end(), argv + 1, argv + argc);
   return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
 }

@@ -7,6 +7,7 @@
 #include "osteo/haptics/contact.h"
 #include "osteo/image/bone_threshold.h"
 #include "osteo/image/crop.h"
+#include "window_flags.h"
 
 namespace osteo {
 
@@ -159,43 +160,24 @@ struct EnumNames<Side> {
 };
 
 struct RehearseCommand {
-  struct Params {
+  struct Params : WindowFlags {
     bool headless = false;
     std::string script;
-    std::string out;
-    BurrKind burr = BurrKind::cutting;
-    double diameter_mm = 4;
-    BurrShape shape = BurrShape::ball;
-    ContactMethod contact = ContactMethod::overlap;
-    std::string settings;
-    std::string device;
     bool show_settings = false;
     Side side = Side::left;
     double seconds = 60;
-    double rate_hz = 1000;
     bool fast = false;
     bool pieces = false;
-    bool dust = false;
-    std::string resume;
   };
   static void describe(Params& p, auto& visit) {
     visit({"headless", "without a window: a scripted hand in front of the same servo"}, p.headless);
-    visit({"script", "strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
-    visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
-    visit({"burr", "kind of burr at the start"}, p.burr);
-    visit({"diameter_mm", "of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
-    visit({"shape", "of the burr at the start"}, p.shape);
-    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
-    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
-    visit({"device", "in the window: auto, mouse, spacemouse or woodenhaptics (empty: auto)"}, p.device);
+    visit({"script", "headless: strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
+    WindowFlags::describe(p, visit);
     visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"}, p.show_settings);
-    visit({"side", "of the patient, for the built-in strokes"}, p.side);
-    visit({"seconds", "length of the built-in strokes", "s", 1, 3600}, p.seconds);
-    visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
+    visit({"side", "headless: of the patient, for the built-in strokes"}, p.side);
+    visit({"seconds", "headless: length of the built-in strokes", "s", 1, 3600}, p.seconds);
     visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
     visit({"pieces", "watch whether the bone still hangs together; the summary lists the pieces (the window always does)"}, p.pieces);
-    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
-    visit({"resume", "go on from the end of this session"}, p.resume);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

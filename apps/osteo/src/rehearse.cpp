@@ -5,6 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <ostream>
+#include <set>
 #include <thread>
 
 #include "commands.h"
@@ -35,22 +36,30 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
   if (!fs::exists(program))
     throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
                 "build with -DOSTEO_WINDOW=ON, or use --headless");
-  std::vector<std::string> args{program.string(), io.arguments[0],
-                                "--burr",         std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(p.burr)]),
-                                "--diameter-mm",  format_number(p.diameter_mm),
-                                "--shape",        std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(p.shape)]),
-                                "--contact",      std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(p.contact)]),
-                                "--rate-hz",      format_number(p.rate_hz)};
-  if (!p.settings.empty()) args.insert(args.end(), {"--settings", p.settings});
-  if (p.dust) args.emplace_back("--dust");
-  if (!p.device.empty()) args.insert(args.end(), {"--device", p.device});
-  if (!p.out.empty()) args.insert(args.end(), {"--out", p.out});
-  if (!p.resume.empty()) args.insert(args.end(), {"--resume", p.resume});
+  std::vector<std::string> args{program.string(), io.arguments[0]};
+  WindowFlags flags = p, defaults;
+  const auto usual = fields_of<WindowFlags>(defaults), given = fields_of<WindowFlags>(flags);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i].to_text() != usual[i].to_text()) args.push_back(given[i].flag() + "=" + given[i].to_text());
+  }
+  if (io.common.quiet) args.emplace_back("--quiet");
   std::vector<char*> argv;
   for (auto& a : args) argv.push_back(a.data());
   argv.push_back(nullptr);
   ::execv(program.c_str(), argv.data());
   throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+}
+
+// What would be given in vain is refused.
+void require_fitting(RehearseCommand::Params p) {
+  static const std::set<std::string_view> of_window{"device", "arm", "width", "height", "state_file"}, of_headless{"script", "side", "seconds", "fast"};
+  RehearseCommand::Params defaults;
+  const auto usual = fields_of<RehearseCommand>(defaults), given = fields_of<RehearseCommand>(p);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i].to_text() == usual[i].to_text() || !(p.headless ? of_window : of_headless).contains(given[i].doc.name)) continue;
+    throw Error(ExitCode::usage, given[i].flag() + (p.headless ? " is of the window, not with --headless" : " needs --headless"),
+                "'osteo help rehearse' tells which flag is for what");
+  }
 }
 
 }  // namespace
@@ -93,6 +102,7 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.show_settings) refuse_what_is_ignored(p, io);
   const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
+  require_fitting(p);
   if (p.show_settings) {
     HapticSetup setup;
     setup.params.contact.method = p.contact;

@@ -168,7 +168,8 @@ std::string output_flag(const Port& port) {
 
 std::string program_help(const Program& program) {
   std::ostringstream out;
-  out << program.about << "\n\nStages (each also a node of a pipeline file and a VTK filter):\n";
+  out << program.about << '\n';
+  if (!program.registry.names().empty()) out << "\nStages (each also a node of a pipeline file and a VTK filter):\n";
   for (const auto& name : program.registry.names()) row(out, name, program.registry.make(name)->info().synopsis);
   out << "\nCommands:\n";
   for (const auto& c : program.commands) row(out, c->info().name, c->info().synopsis);

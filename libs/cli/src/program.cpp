@@ -18,9 +18,9 @@ namespace {
 
 std::atomic<bool> g_cancel{false};
 
-extern "C" void on_signal(int) {
-  // The first asks the work to stop and clean up; a second ends the program at once.
-  if (g_cancel.exchange(true)) ::_exit(130);
+extern "C" void on_signal(int signal) {
+  // The first asks the work to stop and clean up; a second Ctrl-C ends the program at once. A logout may send SIGTERM and SIGHUP together.
+  if (g_cancel.exchange(true) && signal == SIGINT) ::_exit(130);
 }
 
 struct Parsed {

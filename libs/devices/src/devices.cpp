@@ -37,10 +37,8 @@ Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, dou
   return force * (share * (n > most ? most / n : 1.0));
 }
 
-SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, Vec3 start_mm, const Mat3& rotation, int tool, const FootPedal* pedal)
-    : tool_(static_cast<std::uint8_t>(tool)), rotation_(rotation), pedal_(pedal), link_(std::move(open), *this, 100) {
-  goal_.position_mm = start_mm;
-}
+SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal)
+    : goal_(start), tool_(start.tool), rotation_(rotation), pedal_(pedal), link_(std::move(open), *this, 100) {}
 
 void SpaceMouseDevice::report(HidPort&, std::span<const std::byte> report) {
   if (!decode_space_mouse(report, own_.state)) return;
@@ -64,8 +62,8 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
   };
   const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])}, turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
   goal_.position_mm += rotation_ * (move * (kFullMmPerS * dt_s));
-  if (const double rate = length(turn); rate > 0) axis_ = normalized(turned(axis_, rotation_ * (turn / rate), rate * kFullRadPerS * dt_s));
-  goal_.axis = to_floats(axis_);
+  if (const double rate = length(turn); rate > 0)
+    goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
   const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
   goal_.drill_on = (s.buttons & 1U) != 0 || (pressed & 1U) != 0 ? 1 : 0;

@@ -22,19 +22,23 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
+#include <cstdio>
+#include <new>
 #include <optional>
 
 #include "cuts_panel.h"
 #include "gamepad.h"
 #include "help_panel.h"
+#include "keys.h"
 #include "osteo/base/error.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/scene/free_ways.h"
 #include "osteo/view/world_view.h"
 #include "scene_tools.h"
 #include "status_panel.h"
+#include "window_state.h"
 
 namespace osteo {
 namespace {
@@ -45,13 +49,14 @@ constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 class RehearsalWindow {
  public:
   RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
-      : actions_(actions), scan_(options.scan), tool_(options.tool), device_name_(options.device) {
+      : actions_(actions), scan_(options.scan), state_file_(options.state_file), tool_(options.tool), device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
     make_scene();
-    new_bone();
     look_from(kFromLeft);
-    park_drill();
+    show_words("loading the case");
+    attempt(options.from_case, false);
+    look_from(kFromLeft);
   }
 
   ~RehearsalWindow() {
@@ -70,7 +75,10 @@ class RehearsalWindow {
   RehearsalWindow& operator=(const RehearsalWindow&) = delete;
 
   int run() {
-    while (glfwWindowShouldClose(window_) == 0 && !quit_) frame();
+    if (failure_) throw Error(*failure_);  // nothing was begun
+    while (glfwWindowShouldClose(window_) == 0 && !quit_ && !actions_.stop()) frame();
+    if (failure_) throw Error(*failure_);
+    if (lost_) throw Error(*lost_);
     return gl_errors_;
   }
 
@@ -86,7 +94,11 @@ class RehearsalWindow {
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    window_ = glfwCreateWindow(options.width, options.height, options.title.c_str(), nullptr, nullptr);
+    int width = options.width, height = options.height, x = 0, y = 0, screen_width = 0, screen_height = 0;
+    if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
+    if (screen_width > 0) width = std::min(width, screen_width);
+    if (screen_height > 0) height = std::min(height, screen_height);
+    window_ = glfwCreateWindow(width, height, options.title.c_str(), nullptr, nullptr);
     if (window_ == nullptr) {
       glfwTerminate();
       throw Error(ExitCode::failed, "no window can be opened: " + reason, "OpenGL 3.2 is needed");
@@ -103,12 +115,10 @@ class RehearsalWindow {
     render_window_->SetFrameBlitModeToBlitToCurrent();
     render_window_->AddRenderer(renderer_);
 
-    // Keys are queued by a callback, which ImGui chains behind its own: at few pictures a second a short press begins and
-    // ends between two frames, and asking for the state of a key would miss it.
+    // ImGui chains this callback behind its own.
     glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
-      auto* const self = static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w));
-      if (action != GLFW_RELEASE) self->pressed_keys_.push_back({key, action == GLFW_REPEAT});
+      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))->keyboard_.on(key, static_cast<Keyboard::Event>(action));
     });
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;
@@ -136,9 +146,10 @@ class RehearsalWindow {
 
   // The running rehearsal has another bone: show it.
   void new_bone() {
-    world_view_ = std::make_unique<WorldView>(renderer_, actions_.rehearsal().structures());
+    Rehearsal& rehearsal = *actions_.rehearsal();
+    world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
     Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    actions_.rehearsal().look([&](const World& world, Follower& follower) {
+    rehearsal.look([&](const World& world, Follower& follower) {
       world_view_->update(world, follower);
       const BrickGrid& bone = world.bodies().front().body->bone;
       for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
@@ -159,11 +170,65 @@ class RehearsalWindow {
 
   void look_from(Vec3 eye) { look_at(renderer_, centre_, 0.8 * radius_, normalized(eye)); }
 
-  // In front of the bone as seen now, drill off.
-  void park_drill() {
-    const Vec3 towards = view_direction() * -1;
-    goal_ = {centre_ + towards * radius_, {}, 0, static_cast<std::uint8_t>(tool_)};
-    send_goal();
+  // --- sessions ---------------------------------------------------------------------------------------------------
+
+  // Saves what runs, where asked, and begins anew. False: something failed, and the window says what.
+  bool attempt(bool from_case, bool save_first) {
+    failure_.reset();
+    leading_.reset();
+    ran_ = drill_latched_ = sucking_ = washing_ = false;
+    const bool saved = !save_first || guarded([&] { actions_.save(); });
+    if (!saved) lost_ = failure_;
+    const bool begun = saved && guarded([&] {
+      goal_ = actions_.begin(from_case, {towards_eye(), wanted_axis(), tool_});
+      axis_ = from_floats(goal_.axis);
+      new_bone();
+    });
+    return begun;
+  }
+
+  template <class F>
+  bool guarded(F&& f) {
+    try {
+      f();
+      return true;
+    } catch (const Error& e) {
+      failure_ = e;
+    } catch (const std::bad_alloc&) {
+      failure_ = Error(ExitCode::resources, "out of memory");
+    } catch (const std::exception& e) {
+      failure_ = Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it");
+    }
+    return false;
+  }
+
+  // What can no longer be recorded is ended; a rehearsal that has ended without having been asked to says why when it is closed.
+  void watch() {
+    const Rehearsal* const rehearsal = actions_.rehearsal();
+    if (rehearsal == nullptr || failure_) return;
+    if (const std::optional<Error> failed = actions_.failure()) {
+      guarded([&] {
+        actions_.save();
+        throw Error(*failed);
+      });
+      lost_ = failure_;
+    } else if (rehearsal->running()) {
+      ran_ = true;
+    } else if (ran_) {
+      guarded([&] {
+        actions_.save();
+        throw Error(ExitCode::failed, "the session has ended by itself; it is saved", "please report this with the session");
+      });
+      lost_ = failure_;
+    }
+  }
+
+  void reset() {
+    if (attempt(true, true)) say("the bone is whole again; the session before was saved");
+  }
+
+  void save() {
+    if (attempt(false, true)) say("saved; a new session goes on from here");
   }
 
   // --- the hand ---------------------------------------------------------------------------------------------------
@@ -174,22 +239,144 @@ class RehearsalWindow {
     return {d[0], d[1], d[2]};
   }
 
-  void send_goal() {
+  [[nodiscard]] Vec3 towards_eye() const {
+    double p[3];
+    renderer_->GetActiveCamera()->GetPosition(p);
+    return normalized(Vec3{p[0], p[1], p[2]} - centre_);
+  }
+
+  [[nodiscard]] bool plate_in_hand() const { return tools_ && tools_->tool() == SceneTools::Tool::plate; }
+
+  // A drill is held from the right; a plate lies flat against what one looks at.
+  [[nodiscard]] Vec3 wanted_axis() const {
     const Vec3 forward = view_direction();
     double up[3];
     renderer_->GetActiveCamera()->GetViewUp(up);
     const Vec3 right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
-    // A drill is held from the right; a plate lies flat against what one looks at.
-    const bool plate = tools_ && tools_->tool() == SceneTools::Tool::plate;
-    const Vec3 axis = plate ? forward * -1 : normalized(right * 0.62 + above * 0.45 - forward * 0.64);
-    goal_.axis = to_floats(axis);
+    return plate_in_hand() ? forward * -1 : normalized(right * 0.62 + above * 0.45 - forward * 0.64);
+  }
+
+  // Where the hand is; before the first tick, where it will be.
+  [[nodiscard]] HandPose hand_pose(Rehearsal& rehearsal) const {
+    const TickRecord tick = rehearsal.latest();
+    if (tick.tick == 0) return {goal_.position_mm, from_floats(goal_.axis)};
+    return {from_floats(tick.device.position_mm), from_floats(tick.device.axis)};
+  }
+
+  [[nodiscard]] bool outside(Rehearsal& rehearsal) const {
+    const FreeWays ways = free_ways(rehearsal, true);
+    return length(hand_pose(rehearsal).at_mm - ways.centre_mm()) > ways.radius_mm();
+  }
+
+  [[nodiscard]] FreeWays free_ways(Rehearsal& rehearsal, bool whole_tool) const {
+    const auto drill = static_cast<std::size_t>(tool_);
+    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
+    std::optional<FreeWays> ways;
+    rehearsal.look([&](const World& world, Follower&) { ways.emplace(world, std::move(skin)); });
+    return *std::move(ways);
+  }
+
+  // The handle follows the view, as far as bone lets it.
+  void turn_handle(Rehearsal& rehearsal, double seconds) {
+    constexpr double kRadPerS = 4;
+    const Vec3 wanted = wanted_axis();
+    if (length(wanted - axis_) < 1e-3) return;
+    axis_ = free_ways(rehearsal, false).turned({hand_pose(rehearsal).at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
+  }
+
+  void send_goal(Rehearsal& rehearsal, double seconds) {
+    Device& device = rehearsal.device();
+    device.set_tool(static_cast<std::uint8_t>(tool_));
+    if (leading_) {
+      drill_latched_ = false;
+      return;
+    }
+    auto* const mouse = dynamic_cast<MouseDevice*>(&device);
+    if (mouse == nullptr) return;  // it moves and drills by itself
+    turn_handle(rehearsal, seconds);
+    goal_.axis = to_floats(axis_);
     goal_.tool = static_cast<std::uint8_t>(tool_);
     goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
-    Device& device = actions_.rehearsal().device();
-    if (auto* const mouse = dynamic_cast<MouseDevice*>(&device)) {
-      mouse->set_goal(goal_);
+    mouse->set_goal(goal_);
+  }
+
+  // --- the hand goes somewhere by itself --------------------------------------------------------------------------
+
+  // First it lets go of the bone; then the way is found from where it is.
+  struct Leading {
+    enum class Stage { letting_go, on_the_way, put } stage = Stage::letting_go;
+    std::optional<std::uint64_t> quiet_tick;  // when it had let go: what is known of the hand may be older
+    std::optional<Vec3> seen_mm;              // bone to come down at; none: out
+    Vec3 forward;
+    std::string done;
+  };
+
+  void lead(Rehearsal& rehearsal, std::optional<Vec3> seen_mm, Vec3 forward) {
+    if (!rehearsal.device().lead({})) {
+      say("the drill is in your own hand");
+      return;
+    }
+    leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
+    drill_latched_ = false;
+    wait_for_release_ = true;
+  }
+
+  void bring_drill_to_bone(Rehearsal& rehearsal, double x, double y) {
+    // The bone under the mouse: a ray through the live voxels.
+    const Vec3 eye = view_axes().eye_mm, forward = normalized(unproject(x, y, centre_) - eye);
+    std::optional<BoneHit> hit;
+    rehearsal.look([&](const World& world, Follower&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
+    if (!hit) {
+      say("no bone under the mouse");
+      return;
+    }
+    lead(rehearsal, hit->at_mm, forward);
+  }
+
+  void go_on_leading(Rehearsal& rehearsal) {
+    if (!leading_) return;
+    Device& device = rehearsal.device();
+    const Led led = device.led();
+    if (led == Led::on_the_way) return;
+    const auto go = [&](Leading::Stage stage, const HandWay& way, const HandPose& end) {
+      leading_->stage = stage;
+      goal_.position_mm = end.at_mm;
+      axis_ = end.axis;
+      goal_.axis = to_floats(axis_);
+      goal_.drill_on = 0;
+      device.lead(way);
+    };
+    const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
+    if (leading_->stage == Leading::Stage::letting_go) {
+      const std::uint64_t tick = rehearsal.latest().tick;
+      if (!leading_->quiet_tick) leading_->quiet_tick = tick;
+      if (tick <= *leading_->quiet_tick) return;
+      const FreeWays ways = free_ways(rehearsal, true);
+      const HandPose from = hand_pose(rehearsal);
+      if (leading_->seen_mm) {
+        const FreeWays::Approach a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
+        const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
+        char far[80];
+        std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
+        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there" : gap > 6 ? far : "drill brought to the bone";
+        go(Leading::Stage::on_the_way, a.way, a.end);
+      } else {
+        const HandPose to = waiting(ways);
+        const HandWay way = ways.way(from, to);
+        leading_->done = way.put ? "the drill was shut in; it was taken out" : "drill lifted out";
+        go(Leading::Stage::on_the_way, way, to);
+      }
+    } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
+      leading_->done = "the drill was stuck; it was taken out";
+      const HandPose to = waiting(free_ways(rehearsal, true));
+      HandWay way;
+      way.put = true;
+      way.points[0] = {to.at_mm, to_floats(to.axis), false};
+      way.count = 1;
+      go(Leading::Stage::put, way, to);
     } else {
-      device.set_tool(static_cast<std::uint8_t>(tool_));  // it moves and drills by itself
+      say(leading_->done);
+      leading_.reset();
     }
   }
 
@@ -233,54 +420,60 @@ class RehearsalWindow {
     return {{p[0], p[1], p[2]}, forward, right, cross(right, forward)};
   }
 
-  void bring_drill_to_bone(double x, double y) {
-    // The bone under the mouse: a ray through the live voxels.
-    const Vec3 eye = view_axes().eye_mm;
-    std::optional<BoneHit> hit;
-    actions_.rehearsal().look([&](const World& world, Follower&) {
-      hit = bone_on_ray(world, eye, normalized(unproject(x, y, centre_) - eye), length(centre_ - eye) + 4 * radius_);
-    });
-    if (!hit) {
-      say("no bone under the mouse");
-      return;
-    }
-    const double r = burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
-    goal_.position_mm = hit->at_mm - view_direction() * (r + 1);
-    say("drill brought to the bone");
-  }
-
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
     glfwPollEvents();
     glfwGetFramebufferSize(window_, &width_, &height_);
-    if (width_ < 200 || height_ < 150) return;
+    watch();
+    if (width_ < 200 || height_ < 150) {  // put away
+      write_state();
+      glfwWaitEventsTimeout(0.05);
+      return;
+    }
+    begin_picture();
+    if (failure_) {
+      tell_failure();
+    } else {
+      Rehearsal& rehearsal = *actions_.rehearsal();
+      mouse_and_keys(rehearsal);
+      if (!failure_) show(*actions_.rehearsal());  // F5 and R make another
+    }
+    end_picture();
+    ++pictures_;
+    write_state();
+  }
+
+  void begin_picture() {
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
-    mouse_and_keys();
-    panel();
-    cuts_.draw(actions_.rehearsal(), tool_,
-               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
-    if (show_help_) draw_help(show_help_, width_);
-    ImGui::Render();
+  }
 
-    Rehearsal& rehearsal = actions_.rehearsal();
-    rehearsal.look([&](const World& world, Follower& follower) {
+  void show(Rehearsal& rehearsal) {
+    panel(rehearsal);
+    if (failure_) return;
+    Rehearsal& now = *actions_.rehearsal();
+    cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
+    if (show_help_) draw_help(show_help_, width_);
+    now.look([&](const World& world, Follower& follower) {
       world_view_->update(world, follower);
-      if (rehearsal.soft() != nullptr) world_view_->update_soft(*rehearsal.soft());
+      if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
     });
     world_view_->highlight(tools_->piece());
-    const TickRecord tick = rehearsal.latest();
+    const TickRecord tick = now.latest();
     place_tool(tick);
     tools_->show(tick);
-    wash(rehearsal, tick);
+    wash(now, tick);
+  }
 
+  void end_picture() {
+    ImGui::Render();
     render_window_->SetSize(width_, height_);
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
     renderer_->SetViewport(left, 0, right, 1);
     renderer_->ResetCameraClippingRange();
-    world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
+    if (world_view_ && !failure_) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -294,6 +487,40 @@ class RehearsalWindow {
     glfwSwapBuffers(window_);
   }
 
+  // While there is nothing else to see.
+  void show_words(const char* words) {
+    glfwPollEvents();
+    glfwGetFramebufferSize(window_, &width_, &height_);
+    begin_picture();
+    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 100, static_cast<float>(height_) / 2 - 20});
+    ImGui::Begin("words", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::Text("%s", words);
+    ImGui::End();
+    end_picture();
+  }
+
+  // What failed, what is kept, and what can be done now. Nothing runs.
+  void tell_failure() {
+    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 240, static_cast<float>(height_) / 3});
+    ImGui::SetNextWindowSize({480, 0});
+    ImGui::Begin("No session runs", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+    ImGui::TextWrapped("%s", failure_->what());
+    if (!failure_->advice().empty()) ImGui::TextWrapped("%s", failure_->advice().c_str());
+    ImGui::Separator();
+    if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
+    bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
+    bool anew = ImGui::Button("Begin anew from the case (R)", {-1, 0});
+    if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;
+    ImGui::End();
+    for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
+      go_on = go_on || press.command == Command::save;
+      anew = anew || press.command == Command::reset;
+      quit_ = quit_ || press.command == Command::quit;
+      screenshot_wanted_ = screenshot_wanted_ || press.command == Command::screenshot;
+    }
+    if ((go_on || anew) && attempt(anew, false)) say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
+  }
+
   // The second hand: a sucker (V) and water (I) at the burr.
   void wash(Rehearsal& rehearsal, const TickRecord& tick) {
     constexpr double kNozzleMm = 4, kMm3PerS = 60, kSprayMm = 8, kSharePerS = 3;
@@ -302,11 +529,9 @@ class RehearsalWindow {
       if (wanted || on) rehearsal.act(wanted ? with : without);
       on = wanted;
     };
-    say_once(ImGui::IsKeyDown(ImGuiKey_V), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS), SceneAction::suction(at, kNozzleMm, 0));
-    say_once(key_held(GLFW_KEY_I), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS), SceneAction::irrigate(at, kSprayMm, 0));
+    say_once(keyboard_.held(Command::suck), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS), SceneAction::suction(at, kNozzleMm, 0));
+    say_once(keyboard_.held(Command::wash), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS), SceneAction::irrigate(at, kSprayMm, 0));
   }
-  [[nodiscard]] bool key_held(int key) const { return glfwGetKey(window_, key) == GLFW_PRESS && !ImGui::GetIO().WantTextInput; }
-
   void place_tool(const TickRecord& tick) {
     const Vec3 axis = normalized(from_floats(tick.device.axis));
     const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
@@ -326,7 +551,7 @@ class RehearsalWindow {
     burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
   }
 
-  void mouse_and_keys() {
+  void mouse_and_keys(Rehearsal& rehearsal) {
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
     const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
@@ -347,7 +572,9 @@ class RehearsalWindow {
         camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
         camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
       } else if (!tools_->in_hand()) {
-        use_tool(m, io);
+        use_tool(rehearsal, m, io);
+      } else if (leading_) {
+        // It goes by itself.
       } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
         goal_.position_mm += view_direction() * (0.05 * static_cast<double>(-io.MouseDelta.y));
       } else if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) {
@@ -357,117 +584,122 @@ class RehearsalWindow {
         if (io.KeyCtrl) {
           camera->Dolly(std::pow(1.1, static_cast<double>(io.MouseWheel)));
         } else if (!tools_->in_hand()) {
-          tools_->push(1.0 * static_cast<double>(io.MouseWheel), actions_.rehearsal(), view_axes());
-        } else {
+          tools_->push(1.0 * static_cast<double>(io.MouseWheel), rehearsal, view_axes());
+        } else if (!leading_) {
           goal_.position_mm += view_direction() * (0.5 * static_cast<double>(io.MouseWheel));
         }
       }
     }
-    drill_held_ = in_view && !io.WantCaptureMouse && tools_->tool() == SceneTools::Tool::drill && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    // A button that was held when the hand was led away does not drill where it arrives.
+    const bool pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    if (!pressed && !leading_) wait_for_release_ = false;
+    drill_held_ = pressed && !wait_for_release_ && in_view && !io.WantCaptureMouse && tools_->tool() == SceneTools::Tool::drill;
     gamepad(static_cast<double>(io.DeltaTime));
-    const std::vector<KeyPress> presses = std::exchange(pressed_keys_, {});
-    if (!io.WantTextInput) {
-      for (const KeyPress& k : presses) key(k, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
+    for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
+      command(press, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
+      if (failure_) return;
     }
-    send_goal();
+    Rehearsal& now = *actions_.rehearsal();  // F5 and R make another
+    // Who takes up the saw or a piece lets go of the drill: it does not stay in the bone.
+    const bool in_hand = tools_->in_hand();
+    if (in_hand_ && !in_hand && !leading_ && !outside(now)) lead(now, std::nullopt, {});
+    in_hand_ = in_hand;
+    go_on_leading(now);
+    send_goal(now, static_cast<double>(io.DeltaTime));
   }
 
   // Saw and pieces: what the mouse drags is not the hand.
-  void use_tool(const ImVec2& m, const ImGuiIO& io) {
+  void use_tool(Rehearsal& rehearsal, const ImVec2& m, const ImGuiIO& io) {
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
       const Vec3 eye = view_axes().eye_mm;
-      tools_->pick(actions_.rehearsal(), eye, normalized(unproject(static_cast<double>(m.x), static_cast<double>(m.y), centre_) - eye));
+      tools_->pick(rehearsal, eye, normalized(unproject(static_cast<double>(m.x), static_cast<double>(m.y), centre_) - eye));
     }
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (io.MouseDelta.x == 0 && io.MouseDelta.y == 0)) return;
     const Vec3 at = tools_->position_mm();
     const Vec3 by = unproject(static_cast<double>(m.x), static_cast<double>(m.y), at) -
                     unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), at);
     const ViewAxes view = view_axes();
-    tools_->drag(dot(by, view.right), dot(by, view.up), io.KeyShift, actions_.rehearsal(), view);
+    tools_->drag(dot(by, view.right), dot(by, view.up), io.KeyShift, rehearsal, view);
   }
 
   void gamepad(double seconds) {
     const auto pad = read_gamepad();
-    if (!pad) return;
+    if (!pad || leading_) return;
     double up[3];
     renderer_->GetActiveCamera()->GetViewUp(up);
     const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
     goal_.position_mm += (right * pad->right_mm_s + above * pad->up_mm_s + forward * pad->deeper_mm_s) * std::min(seconds, 0.1);
-    drill_held_ = drill_held_ || pad->drill;
+    if (!pad->drill && !drill_held_) wait_for_release_ = false;
+    drill_held_ = drill_held_ || (pad->drill && !wait_for_release_);
   }
 
-  struct KeyPress {
-    int key;
-    bool repeated;
-  };
-
-  void key(KeyPress press, double x, double y, bool in_view) {
-    if (press.key == GLFW_KEY_DOWN) goal_.position_mm += view_direction() * 0.25;
-    if (press.key == GLFW_KEY_UP) goal_.position_mm -= view_direction() * 0.25;
-    if ((!press.repeated || press.key == GLFW_KEY_A || press.key == GLFW_KEY_E) &&
-        tools_->key(press.key, actions_.rehearsal(), view_axes()))
-      return;
-    if (press.repeated) return;
-    if (press.key >= GLFW_KEY_1 && press.key <= GLFW_KEY_7) set_diameter(press.key - GLFW_KEY_1 + 1);
-    switch (press.key) {
-      case GLFW_KEY_F:
-        if (in_view) bring_drill_to_bone(x, y);
+  void command(const Keyboard::Press& press, double x, double y, bool in_view) {
+    Rehearsal& rehearsal = *actions_.rehearsal();
+    if (tools_->key(press.command, rehearsal, view_axes())) return;
+    switch (press.command) {
+      case Command::deeper:
+        if (!leading_) goal_.position_mm += view_direction() * 0.25;
         break;
-      case GLFW_KEY_SPACE:
-        drill_latched_ = !drill_latched_;
+      case Command::back:
+        if (!leading_) goal_.position_mm -= view_direction() * 0.25;
         break;
-      case GLFW_KEY_S:
-        screenshot_wanted_ = true;
+      case Command::bring:
+        if (in_view) bring_drill_to_bone(rehearsal, x, y);
         break;
-      case GLFW_KEY_F1:
-      case GLFW_KEY_H:
-        show_help_ = !show_help_;
+      case Command::lift:
+        lead(rehearsal, std::nullopt, {});
         break;
-      case GLFW_KEY_R:
-        reset();
+      case Command::drill:
+        drill_latched_ = !drill_latched_ && !leading_;
         break;
-      case GLFW_KEY_F5:
-        save();
+      case Command::diameter:
+        set_diameter(press.value);
         break;
-      case GLFW_KEY_Q:
-        quit_ = true;
-        break;
-      case GLFW_KEY_C:
+      case Command::cutting:
         set_kind(BurrKind::cutting);
         break;
-      case GLFW_KEY_D:
+      case Command::diamond:
         set_kind(BurrKind::diamond);
         break;
-      case GLFW_KEY_B:
+      case Command::ball:
         set_shape(BurrShape::ball);
         break;
-      case GLFW_KEY_Y:
+      case Command::cylinder:
         set_shape(BurrShape::cylinder);
         break;
-      case GLFW_KEY_T:
+      case Command::taper:
         set_shape(BurrShape::taper);
         break;
-      case GLFW_KEY_HOME:
+      case Command::screenshot:
+        screenshot_wanted_ = true;
+        break;
+      case Command::save:
+        save();
+        break;
+      case Command::reset:
+        reset();
+        break;
+      case Command::home:
         look_from(kFromLeft);
         break;
-      default:
+      case Command::help:
+        show_help_ = !show_help_;
+        break;
+      case Command::quit:
+        quit_ = true;
+        break;
+      case Command::suck:  // while held: wash()
+      case Command::wash:
+      case Command::saw:  // the tools'
+      case Command::pieces:
+      case Command::plates:
+      case Command::turn_left:
+      case Command::turn_right:
+      case Command::perform:
+      case Command::undo:
+      case Command::put_away:
         break;
     }
-  }
-
-  void reset() {
-    actions_.save();
-    actions_.begin(true);
-    new_bone();
-    park_drill();
-    say("the bone is whole again; the session before was saved");
-  }
-
-  void save() {
-    actions_.save();
-    actions_.begin(false);
-    new_bone();
-    say("saved; a new session goes on from here");
   }
 
   void save_screenshot() {
@@ -502,8 +734,7 @@ class RehearsalWindow {
     message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
   }
 
-  void panel() {
-    Rehearsal& rehearsal = actions_.rehearsal();
+  void panel(Rehearsal& rehearsal) {
     const TickRecord tick = rehearsal.latest();
     ImGui::SetNextWindowPos({0, 0});
     ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
@@ -524,12 +755,12 @@ class RehearsalWindow {
     ImGui::Separator();
     tools_->panel(rehearsal, view_axes());
     ImGui::Separator();
-    draw_status(rehearsal, tick);
-    ImGui::Separator();
     if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
+    if (ImGui::Button("Lift the drill out (U)", {-1, 0})) lead(rehearsal, std::nullopt, {});
     if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
-    if (ImGui::Button("Save and go on (F5)", {-1, 0})) save();
-    if (ImGui::Button("Reset the bone (R)", {-1, 0})) reset();
+    const bool saves = ImGui::Button("Save and go on (F5)", {-1, 0});
+    ImGui::Dummy({0, 6});
+    const bool resets = ImGui::Button("Reset the bone (R)", {-1, 0});
     ImGui::Separator();
     ImGui::Text("Look from");
     if (ImGui::Button("left")) look_from(kFromLeft);
@@ -539,6 +770,8 @@ class RehearsalWindow {
     if (ImGui::Button("front")) look_from({0, -1, 0.1});
     ImGui::SameLine();
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
+    ImGui::Separator();
+    draw_status(rehearsal, tick);  // below the buttons, which its lines would move
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
@@ -550,15 +783,58 @@ class RehearsalWindow {
     ImGui::Separator();
     draw_scan(scan_);
     ImGui::TextWrapped("F1: mouse and keys");
-    if (std::chrono::steady_clock::now() < message_until_) {
+    if (leading_ || std::chrono::steady_clock::now() < message_until_) {
       ImGui::Separator();
-      ImGui::TextWrapped("%s", message_.c_str());
+      ImGui::TextWrapped("%s", leading_ ? "the drill is on its way, off" : message_.c_str());
     }
     ImGui::End();
+    // Last: the rehearsal is another one afterwards.
+    if (saves) {
+      save();
+    } else if (resets) {
+      reset();
+    }
+  }
+
+  // For tests: what can be seen, as numbers. Whole at any moment.
+  void write_state() {
+    if (state_file_.empty()) return;
+    WindowState state;
+    state.pictures = pictures_;
+    state.failure = failure_ ? failure_->what() : "";
+    state.message = leading_ ? "on the way" : message_;
+    state.leading = leading_.has_value();
+    state.session = actions_.folder();
+    state.tool = burr_library()[static_cast<std::size_t>(tool_)].name();
+    state.drill_latched = drill_latched_;
+    state.help = show_help_;
+    state.sucking = sucking_;
+    state.washing = washing_;
+    state.hand = tools_ ? static_cast<int>(tools_->tool()) : 0;
+    state.cut = tools_ ? tools_->cut() : SawCut{};
+    state.plate = tools_ ? tools_->plate_grip() : RigidTransform{};
+    state.eye = towards_eye();
+    state.centre_mm = centre_;
+    state.radius_mm = radius_;
+    state.goal_mm = goal_.position_mm;
+    state.width = width_;
+    state.height = height_;
+    if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !failure_) {
+      state.tick = rehearsal->latest();
+      state.removed_mm3 = rehearsal->removed_mm3();
+      rehearsal->look([&](const World& world, Follower&) {
+        state.bodies = world.bodies().size();
+        state.fixtures = world.fixtures().size();
+        state.undo_steps = world.undo_steps();
+        for (const PlacedBody& b : world.bodies()) state.places_mm.push_back(b.world_from_body.shift_mm);
+      });
+    }
+    write_window_state(state, state_file_);
   }
 
   WindowActions actions_;
   VerdictSummary scan_;
+  std::filesystem::path state_file_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
@@ -572,12 +848,17 @@ class RehearsalWindow {
   Vec3 centre_{};
   double radius_ = 100;
   HandGoal goal_;
+  Vec3 axis_{0, 0, 1};  // of the handle, on its way to what the view wants
+  std::optional<Leading> leading_;
+  std::optional<Error> failure_;  // nothing runs until something is begun
+  std::optional<Error> lost_;     // and this was lost for good
   int tool_;
   std::string device_name_;
   int gl_errors_ = 0;
-  bool sucking_ = false, washing_ = false;
+  std::uint64_t pictures_ = 0;
+  bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false, in_hand_ = true;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
-  std::vector<KeyPress> pressed_keys_;
+  Keyboard keyboard_;
   std::string message_;
   std::chrono::steady_clock::time_point message_until_{};
 };

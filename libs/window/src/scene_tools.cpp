@@ -1,6 +1,5 @@
 #include "scene_tools.h"
 
-#include <GLFW/glfw3.h>
 #include <imgui.h>
 
 #include <vtkActor.h>
@@ -98,6 +97,10 @@ void SceneTools::choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view) {
   if (tool == Tool::plate) grip(rehearsal);
 }
 
+RigidTransform SceneTools::plate_grip() const {
+  return grip_of(turn_deg_, tilt_deg_);
+}
+
 void SceneTools::grip(Rehearsal& rehearsal) {
   rehearsal.act(SceneAction::grip(static_cast<std::uint32_t>(plate_), grip_of(turn_deg_, tilt_deg_)));
 }
@@ -170,24 +173,24 @@ void SceneTools::push(double deeper_mm, Rehearsal& rehearsal, const ViewAxes& vi
   if (tool_ == Tool::piece) move_piece(rehearsal, {{}, view.forward * deeper_mm});
 }
 
-bool SceneTools::key(int key, Rehearsal& rehearsal, const ViewAxes& view) {
-  switch (key) {
-    case GLFW_KEY_X:
+bool SceneTools::key(Command command, Rehearsal& rehearsal, const ViewAxes& view) {
+  switch (command) {
+    case Command::saw:
       choose(Tool::saw, rehearsal, view);
       return true;
-    case GLFW_KEY_P:
+    case Command::pieces:
       choose(Tool::piece, rehearsal, view);
       return true;
-    case GLFW_KEY_L:
+    case Command::plates:
       choose(Tool::plate, rehearsal, view);
       return true;
-    case GLFW_KEY_Z:
+    case Command::undo:
       rehearsal.act(SceneAction::plain(ActionKind::undo));
       piece_ = SceneAction::kNobody;
       return true;
-    case GLFW_KEY_A:
-    case GLFW_KEY_E: {
-      const double turn = key == GLFW_KEY_A ? kKeyTurn : -kKeyTurn;
+    case Command::turn_left:
+    case Command::turn_right: {
+      const double turn = command == Command::turn_left ? kKeyTurn : -kKeyTurn;
       if (tool_ == Tool::saw) turn_saw(view.forward, turn);
       if (tool_ == Tool::piece) move_piece(rehearsal, rotation_about(handle_mm_, view.forward, turn));
       if (tool_ == Tool::plate) {
@@ -197,13 +200,12 @@ bool SceneTools::key(int key, Rehearsal& rehearsal, const ViewAxes& view) {
       }
       return tool_ != Tool::drill;
     }
-    case GLFW_KEY_ENTER:
-    case GLFW_KEY_KP_ENTER:
+    case Command::perform:
       if (tool_ == Tool::saw) rehearsal.act(SceneAction::saw(cut_));
       if (tool_ == Tool::piece) rehearsal.act(SceneAction::split(kCrumbMm3));
       if (tool_ == Tool::plate) attach(rehearsal);
       return tool_ != Tool::drill || !in_hand();
-    case GLFW_KEY_ESCAPE:
+    case Command::put_away:
       if (tool_ == Tool::drill) return false;
       choose(tool_, rehearsal, view);
       return true;

@@ -8,6 +8,7 @@
 
 #include <vtkSmartPointer.h>
 
+#include "keys.h"
 #include "osteo/scene/rehearsal.h"
 
 class vtkActor;
@@ -39,12 +40,16 @@ class SceneTools {
   /// A section of the panel. `say` shows a line to the user.
   void panel(Rehearsal& rehearsal, const ViewAxes& view);
   /// True when the key was meant for a tool.
-  bool key(int glfw_key, Rehearsal& rehearsal, const ViewAxes& view);
+  bool key(Command command, Rehearsal& rehearsal, const ViewAxes& view);
   /// A motion of the mouse over the view by so many mm at the tool's depth, or a wheel step; only where in_hand() is false.
   void drag(double right_mm, double up_mm, bool turn, Rehearsal& rehearsal, const ViewAxes& view);
   void push(double deeper_mm, Rehearsal& rehearsal, const ViewAxes& view);
   /// Takes up the piece that a ray hits.
   void pick(Rehearsal& rehearsal, Vec3 from_mm, Vec3 direction);
+  /// What the hand holds, when it is a plate: which, and how.
+  [[nodiscard]] std::size_t plate() const { return static_cast<std::size_t>(plate_); }
+  [[nodiscard]] RigidTransform plate_grip() const;
+  [[nodiscard]] const SawCut& cut() const { return cut_; }
   /// Where the tool is: mouse motions are measured at this depth.
   [[nodiscard]] Vec3 position_mm() const { return tool_ == Tool::saw ? cut_.at_mm : handle_mm_; }
   /// The piece that is moved; kNobody: none.

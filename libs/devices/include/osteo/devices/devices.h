@@ -76,9 +76,14 @@ class FootPedal final : HidHandler {
 class SpaceMouseDevice final : public Device, HidHandler {
  public:
   /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
-  SpaceMouseDevice(HidLink::Open open, Vec3 start_mm, const Mat3& rotation, int tool, const FootPedal* pedal);
+  SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
+  bool lead(const HandWay& way) noexcept override {
+    hand_.lead(way);
+    return true;
+  }
+  Led led() noexcept override { return hand_.led(); }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const override { return link_.trouble(); }
@@ -93,9 +98,8 @@ class SpaceMouseDevice final : public Device, HidHandler {
   Seqlock<Shared> shared_;
   Shared own_, last_;
   HandGoal goal_;
-  Vec3 axis_{0, 0, 1};
   std::atomic<std::uint8_t> tool_;
-  SpringHand hand_;
+  GuidedHand hand_;
   Mat3 rotation_;
   const FootPedal* pedal_;
   HidLink link_;

@@ -1,6 +1,7 @@
 // Devices: where the hand is, and what it feels.
 #pragma once
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -12,6 +13,22 @@
 
 namespace osteo {
 
+/// A way that a hand takes by itself, the drill off: straight from point to point, from wherever it is. FreeWays finds them.
+struct HandWay {
+  static constexpr std::size_t kMost = 96;
+  struct Point {
+    Vec3 at_mm;
+    std::array<float, 3> axis{0, 0, 1};
+    bool near_bone = false;  ///< on the way here bone is near: slowly, and with hardly any pull
+  };
+  std::array<Point, kMost> points;
+  std::uint32_t count = 0;  ///< 0: it only lets go, until bone has pushed it out
+  bool put = false;         ///< no free way leads to the first point: the tool is taken away and put there
+};
+
+/// How far a way has got.
+enum class Led { no, on_the_way, arrived, blocked };
+
 /// Called by the servo only; no allocation, no exception, no wait.
 class Device {
  public:
@@ -20,6 +37,10 @@ class Device {
   virtual DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept = 0;
   /// Another tool is taken up; from any thread. Devices whose samples name their tool themselves ignore it.
   virtual void set_tool(std::uint8_t) noexcept {}
+  /// The hand is to go a way by itself; false where it cannot, since a person holds it. From the one thread that also asks led().
+  virtual bool lead(const HandWay&) noexcept { return false; }
+  /// Of the last way; `no` where there was none.
+  virtual Led led() noexcept { return Led::no; }
   /// The force of this tick and the plane of contact it stems from (normal zero without), for devices that hold it longer than a tick.
   virtual void feel(Vec3 /*force_n*/, Vec3 /*normal*/, double /*stiffness_n_per_mm*/) noexcept {}
   /// What the guard needs to know of it.
@@ -45,23 +66,71 @@ class SpringHand {
   static DeviceTraits traits() { return {.damping_n_s_per_m = 21, .delay_s = 0, .encoder_mm = 0, .max_force_n = 100}; }
   /// Moves on by dt; the first call starts at the goal.
   DeviceSample step(const HandGoal& goal, double dt_s, Vec3 force_n) noexcept;
+  [[nodiscard]] Vec3 position_mm() const { return position_mm_; }
+  /// At rest, there, from the next step on.
+  void put(Vec3 at_mm) noexcept;
+  /// The same, unless it has started.
+  void start(Vec3 at_mm) noexcept {
+    if (!started_) put(at_mm);
+  }
 
  private:
   bool started_ = false;
   Vec3 position_mm_, velocity_mm_s_;
 };
 
+/// A spring hand that can be led along a way: its goal goes ahead by no more than pulls gently, and waits where the hand cannot follow. Near
+/// bone 30 mm/s and 0.8 mm ahead (0.64 N), else 200 mm/s. Without headway for a second the way is given up, where the hand is.
+class GuidedHand {
+ public:
+  /// From one other thread, which also asks led().
+  void lead(const HandWay& way) noexcept;
+  [[nodiscard]] Led led() const noexcept;
+  /// The servo's: moves on by dt, along the way or to the goal. While it is led `goal` becomes the way's, and stays so at its end.
+  DeviceSample step(HandGoal& goal, double dt_s, Vec3 force_n) noexcept;
+  /// How many ways have come to an end.
+  [[nodiscard]] std::uint32_t ended() const noexcept { return ended_.load(std::memory_order_acquire) >> 1; }
+  [[nodiscard]] bool leading() const noexcept { return leading_; }  ///< the servo's
+
+ private:
+  void begin(const HandGoal& goal) noexcept;
+  void end(bool blocked) noexcept;
+  struct Numbered {
+    HandWay way;
+    std::uint32_t number = 0;
+  };
+  Seqlock<Numbered> given_way_;
+  std::atomic<std::uint32_t> given_{0}, ended_{0};  // number of ways; ended: shifted by one, the last bit says blocked
+  Numbered now_;
+  bool leading_ = false;
+  std::uint32_t leg_ = 0;
+  double share_ = 0, waited_s_ = 0, quiet_s_ = 0;
+  Vec3 from_mm_, from_axis_;
+  SpringHand hand_;
+};
+
 /// The goal is set by another thread (the window).
 class MouseDevice final : public Device {
  public:
-  void set_goal(const HandGoal& goal) noexcept { goal_.store(goal); }
+  /// The first tick is there.
+  explicit MouseDevice(const HandGoal& start) : last_{start, 0}, held_(start) { goal_.store(last_); }
+  /// While a way is under way it is not heard, nor after that until led() has told of its end.
+  void set_goal(const HandGoal& goal) noexcept { goal_.store({goal, seen_}); }
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
+  bool lead(const HandWay& way) noexcept override;
+  Led led() noexcept override;
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
 
  private:
-  Seqlock<HandGoal> goal_;
-  HandGoal last_{};
-  SpringHand hand_;
+  struct Sent {
+    HandGoal goal;
+    std::uint32_t ways = 0;  // of whose end its sender knew
+  };
+  Seqlock<Sent> goal_;
+  Sent last_;
+  HandGoal held_;
+  GuidedHand hand_;
+  std::uint32_t seen_ = 0;  // the window's
 };
 
 /// Straight moves between points in time.

@@ -2,9 +2,10 @@
 #pragma once
 #include <filesystem>
 #include <functional>
-#include <memory>
+#include <optional>
 #include <string>
 
+#include "osteo/base/error.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/scene/rehearsal.h"
@@ -12,27 +13,42 @@
 namespace osteo {
 
 struct WindowOptions {
-  int width = 1360, height = 860;
+  int width = 1360, height = 860;  ///< made smaller where the screen is
   std::string title;
   int tool = 3;
+  bool from_case = true;          ///< how the first session begins
   std::string device = "mouse";  ///< as the panel names it
   VerdictSummary scan;  ///< what the import found in the scan; status empty: unknown
+  std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
-/// What the window asks of whoever runs the rehearsal.
+/// How the window looks at the bone when a session begins. Unit vectors.
+struct HandView {
+  Vec3 eye;   ///< from the bone towards who looks
+  Vec3 axis;  ///< along the handle
+  int tool = 3;
+};
+
+/// What the window asks of whoever runs the rehearsal. After save, and after anything that throws, nothing runs.
 struct WindowActions {
-  /// Ends the session that runs, closes its files.
+  /// Ends the session that runs, closes its files; where none runs, does nothing.
   std::function<void()> save;
-  /// Starts a session: from the case's bone (true) or from where the last one ended (false).
-  std::function<void(bool from_case)> begin;
-  /// The rehearsal that runs now; changes with `begin`.
-  std::function<Rehearsal&()> rehearsal;
-  /// Folder for screenshots of the session that runs now.
+  /// Starts a session: from the case's bone (true) or from where the last one ended (false). The hand waits beside the bone, as returned.
+  std::function<HandGoal(bool from_case, const HandView& view)> begin;
+  /// The rehearsal that runs now; null where none does.
+  std::function<Rehearsal*()> rehearsal;
+  /// Folder for screenshots of the session that runs now, or ran last.
   std::function<std::filesystem::path()> folder;
+  /// Why the session that runs has to end now (its recording has): the window saves it and says so.
+  std::function<std::optional<Error>()> failure;
+  /// Asked before each picture: whether the window is to close.
+  std::function<bool()> stop;
 };
 
-/// Runs until the window is closed. Returns the number of OpenGL errors seen (0 when all is well).
-/// Error(failed) when no window can be opened. Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
+/// Opens a window, begins a session, and runs until the window is closed; the session that runs then is the caller's to save. Returns the
+/// number of OpenGL errors seen (0 when all is well). What fails meanwhile is shown in the window, which offers to begin anew; what was not
+/// put right, or was lost, is thrown once the window is closed. Error(failed) when no window can be opened: then nothing was begun.
+/// Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
 int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions);
 
 }  // namespace osteo

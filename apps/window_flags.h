@@ -1,0 +1,50 @@
+// Flags of the window: declared once, for 'osteo rehearse', which passes them on, and for osteo-rehearse.
+#pragma once
+#include <string>
+
+#include "osteo/bone/burr.h"
+#include "osteo/haptics/contact.h"
+
+namespace osteo {
+
+enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics };
+template <>
+struct EnumNames<Hand> {
+  static constexpr std::array<std::string_view, 4> values{"auto", "mouse", "spacemouse", "woodenhaptics"};
+};
+
+struct WindowFlags {
+  using Params = WindowFlags;
+  std::string out;
+  BurrKind burr = BurrKind::cutting;
+  double diameter_mm = 4;
+  BurrShape shape = BurrShape::ball;
+  ContactMethod contact = ContactMethod::overlap;
+  std::string settings;
+  Hand device = Hand::automatic;
+  std::string arm;
+  bool dust = false;
+  double rate_hz = 1000;
+  std::string resume;
+  int width = 1360;
+  int height = 860;
+  std::string state_file;
+  static void describe(WindowFlags& p, auto& visit) {
+    visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
+    visit({"burr", "kind of burr at the start"}, p.burr);
+    visit({"diameter_mm", "of the burr at the start: 1, 2, 3, 4, 5, 6 or 7", "mm", 1, 7}, p.diameter_mm);
+    visit({"shape", "of the burr at the start"}, p.shape);
+    visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
+    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"device", "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
+    visit({"arm", "in the window, geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
+    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
+    visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
+    visit({"resume", "go on from the end of this session"}, p.resume);
+    visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
+    visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
+    visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);
+  }
+};
+
+}  // namespace osteo

@@ -1,0 +1,131 @@
+#include "keys.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace osteo {
+namespace {
+
+// GLFW's numbers for keys without a letter (GLFW 3, stable): letters and digits are their ASCII capitals.
+enum : int {
+  kSpace = 32,
+  kEscape = 256,
+  kEnter = 257,
+  kDown = 264,
+  kUp = 265,
+  kHome = 268,
+  kF1 = 290,
+  kF5 = 294,
+  kKeypadEnter = 335,
+};
+
+constexpr Key kKeys[] = {
+    {'F', Command::bring},
+    {'U', Command::lift},
+    {kDown, Command::deeper, Key::When::repeated},
+    {kUp, Command::back, Key::When::repeated},
+    {kSpace, Command::drill},
+    {'1', Command::diameter, Key::When::pressed, 1},
+    {'2', Command::diameter, Key::When::pressed, 2},
+    {'3', Command::diameter, Key::When::pressed, 3},
+    {'4', Command::diameter, Key::When::pressed, 4},
+    {'5', Command::diameter, Key::When::pressed, 5},
+    {'6', Command::diameter, Key::When::pressed, 6},
+    {'7', Command::diameter, Key::When::pressed, 7},
+    {'C', Command::cutting},
+    {'D', Command::diamond},
+    {'B', Command::ball},
+    {'Y', Command::cylinder},
+    {'T', Command::taper},
+    {'V', Command::suck, Key::When::held},
+    {'I', Command::wash, Key::When::held},
+    {'X', Command::saw},
+    {'P', Command::pieces},
+    {'L', Command::plates},
+    {'A', Command::turn_left, Key::When::repeated},
+    {'E', Command::turn_right, Key::When::repeated},
+    {kEnter, Command::perform},
+    {kKeypadEnter, Command::perform},
+    {'Z', Command::undo},
+    {kEscape, Command::put_away},
+    {'S', Command::screenshot},
+    {kF5, Command::save},
+    {'R', Command::reset},
+    {kHome, Command::home},
+    {kF1, Command::help},
+    {'H', Command::help},
+    {'Q', Command::quit},
+};
+
+bool has(const std::vector<Command>& list, Command c) {
+  return std::find(list.begin(), list.end(), c) != list.end();
+}
+
+}  // namespace
+
+std::span<const Key> key_table() {
+  return kKeys;
+}
+
+const Key* find_key(int code) {
+  const auto* const at = std::find_if(std::begin(kKeys), std::end(kKeys), [&](const Key& k) { return k.code == code; });
+  return at == std::end(kKeys) ? nullptr : at;
+}
+
+const std::vector<HelpLine>& help_lines() {
+  using enum Command;
+  static const std::vector<HelpLine> lines = {
+      {"move", "moves the drill across the view", {}},
+      {"F", "lifts the drill over to the bone under the mouse, drill off", {bring}},
+      {"U", "lifts the drill out of the bone, drill off", {lift}},
+      {"wheel, Up, Down, Shift-drag", "moves it deeper or back", {deeper, back}},
+      {"left button, Space", "drills while held; Space: on and off", {drill}},
+      {"right drag", "turns the view", {}},
+      {"middle drag", "shifts the view", {}},
+      {"Ctrl-wheel", "nearer and farther", {}},
+      {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
+      {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
+      {"V, I", "sucks dust off at the burr; washes it away", {suck, wash}},
+      {"X", "saw: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
+      {"P", "pieces: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
+      {"L", "plate in the hand, moved like the drill", {plates}},
+      {"A, E", "turn the saw, the piece or the plate", {turn_left, turn_right}},
+      {"Enter", "cut; take apart; fix the plate", {perform}},
+      {"Z", "takes back the last cut, move, plate", {undo}},
+      {"Esc", "back to the drill", {put_away}},
+      {"S", "screenshot into the session's folder", {screenshot}},
+      {"F5", "save the session and go on", {save}},
+      {"R", "save the session, the bone is whole again", {reset}},
+      {"Home", "view from the left", {home}},
+      {"F1, H", "shows this, and hides it", {help}},
+      {"Q", "save and close", {quit}}};
+  return lines;
+}
+
+void Keyboard::on(int code, Event event) {
+  const Key* const key = find_key(code);
+  if (key == nullptr) return;
+  if (event == Event::released) {
+    std::erase(down_, key->command);
+    return;
+  }
+  if (event == Event::pressed || key->when == Key::When::repeated) presses_.push_back({key->command, key->value});
+  if (!has(down_, key->command)) down_.push_back(key->command);
+  if (!has(since_, key->command)) since_.push_back(key->command);
+}
+
+std::vector<Keyboard::Press> Keyboard::frame(bool ignore) {
+  held_ = ignore ? std::vector<Command>{} : down_;
+  for (const Command c : std::exchange(since_, {})) {
+    if (!ignore && !has(held_, c)) held_.push_back(c);
+  }
+  std::vector<Press> presses = std::exchange(presses_, {});
+  if (ignore) presses.clear();
+  return presses;
+}
+
+bool Keyboard::held(Command command) const {
+  return has(held_, command);
+}
+
+}  // namespace osteo

@@ -1,0 +1,77 @@
+// Which key does what: one table for the window, its help and its tests. Private to libs/window; no GLFW, no ImGui, no screen.
+#pragma once
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace osteo {
+
+enum class Command {
+  bring,
+  lift,
+  deeper,
+  back,
+  drill,
+  diameter,  // value: mm
+  cutting,
+  diamond,
+  ball,
+  cylinder,
+  taper,
+  suck,
+  wash,
+  saw,
+  pieces,
+  plates,
+  turn_left,
+  turn_right,
+  perform,
+  undo,
+  put_away,
+  screenshot,
+  save,
+  reset,
+  home,
+  help,
+  quit,
+};
+
+struct Key {
+  int code;  ///< as GLFW numbers keys
+  Command command;
+  enum class When { pressed, repeated, held } when = When::pressed;
+  int value = 0;
+};
+[[nodiscard]] std::span<const Key> key_table();
+[[nodiscard]] const Key* find_key(int code);
+
+/// A line of the window's help, and the commands it tells of; none: of the mouse.
+struct HelpLine {
+  const char* keys;
+  const char* text;
+  std::vector<Command> commands;
+};
+[[nodiscard]] const std::vector<HelpLine>& help_lines();
+
+/// Keys as the window's callback reports them. Events, not states: at few pictures a second a short press begins and ends between two
+/// frames. ImGui is not asked: until 1.87 it knew keys by the numbers of its backend, since then by its own.
+class Keyboard {
+ public:
+  enum class Event { released = 0, pressed = 1, repeated = 2 };  // as GLFW numbers them
+  void on(int code, Event event);
+  struct Press {
+    Command command;
+    int value;
+  };
+  /// What was pressed since the last frame, in order; with `ignore` (someone writes text) nothing, and nothing is held.
+  [[nodiscard]] std::vector<Press> frame(bool ignore);
+  /// In this frame, also when it was let go again before it.
+  [[nodiscard]] bool held(Command command) const;
+
+ private:
+  std::vector<Press> presses_;
+  std::vector<Command> down_, since_, held_;
+};
+
+}  // namespace osteo

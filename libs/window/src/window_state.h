@@ -1,0 +1,33 @@
+// What the window shows, for programs that test it. Private to libs/window.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "osteo/bone/rigid_transform.h"
+#include "osteo/bone/saw.h"
+#include "osteo/haptics/stream.h"
+
+namespace osteo {
+
+struct WindowState {
+  std::uint64_t pictures = 0;
+  std::string failure, message, tool;
+  std::filesystem::path session;
+  bool leading = false, drill_latched = false, help = false, sucking = false, washing = false;
+  int hand = 0;  // SceneTools::Tool
+  SawCut cut;
+  RigidTransform plate;
+  Vec3 eye, centre_mm, goal_mm;
+  double radius_mm = 0;
+  int width = 0, height = 0;
+  TickRecord tick;
+  double removed_mm3 = 0;
+  std::size_t bodies = 0, fixtures = 0, undo_steps = 0;
+  std::vector<Vec3> places_mm;
+};
+
+/// As JSON, in place of what was there; a reader sees the one or the other. What cannot be written is left out.
+void write_window_state(const WindowState& state, const std::filesystem::path& file);
+
+}  // namespace osteo

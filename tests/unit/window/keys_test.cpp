@@ -1,0 +1,125 @@
+// The window's keys, without a window.
+#include "keys.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <string>
+
+namespace osteo {
+namespace {
+
+using Event = Keyboard::Event;
+
+TEST(Keys, EachKeyHasOneMeaning) {
+  std::set<int> codes;
+  for (const Key& k : key_table()) {
+    EXPECT_TRUE(codes.insert(k.code).second) << k.code;
+    EXPECT_EQ(find_key(k.code)->command, k.command);
+  }
+  EXPECT_EQ(find_key('J'), nullptr);
+}
+
+TEST(Keys, HelpTellsOfEachCommandOnceAndOfNoOther) {
+  std::multiset<Command> told, bound;
+  for (const HelpLine& line : help_lines()) told.insert(line.commands.begin(), line.commands.end());
+  for (const Key& k : key_table()) bound.insert(k.command);
+  for (const Command c : bound) EXPECT_EQ(told.count(c), 1U) << static_cast<int>(c);
+  for (const Command c : told) EXPECT_GE(bound.count(c), 1U) << static_cast<int>(c);
+}
+
+// Letters in a line of the help are the ones that do it.
+TEST(Keys, HelpNamesTheKeysThemselves) {
+  for (const HelpLine& line : help_lines()) {
+    const std::string keys = std::string(" ") + line.keys + ",";
+    for (const Key& k : key_table()) {
+      const bool letter = k.code >= 'A' && k.code <= 'Z';
+      const bool told = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
+      if (letter) EXPECT_EQ(keys.find(std::string(" ") + static_cast<char>(k.code) + ",") != std::string::npos, told) << line.keys;
+    }
+  }
+}
+
+TEST(Keys, TheGuideTellsOfEachKey) {
+  std::ifstream file(OSTEO_SOURCE "/docs/guide-surgeon.md");
+  std::stringstream text;
+  text << file.rdbuf();
+  // Of the table of keys the first column.
+  std::string keys, line;
+  while (std::getline(text, line)) {
+    if (line.starts_with("| ")) keys += " " + line.substr(2, line.find(" |", 2) - 2) + ",";
+    if (line.starts_with("## ")) break;
+  }
+  std::erase(keys, '*');
+  for (const Key& k : key_table()) {
+    if (k.code < 'A' || k.code > 'Z') continue;
+    EXPECT_NE(keys.find(std::string(" ") + static_cast<char>(k.code) + ","), std::string::npos) << static_cast<char>(k.code);
+  }
+  for (const char* name : {" F5,", " Enter,", " Esc,", " Home,", " Space,", " Up,", " Down,", " F1,", " 1 to 7,"})
+    EXPECT_NE(keys.find(name), std::string::npos) << name << " in" << keys;
+}
+
+// At few pictures a second a key goes down and up between two of them.
+TEST(Keyboard, AShortPressIsNotMissed) {
+  Keyboard k;
+  k.on('V', Event::pressed);
+  k.on('V', Event::released);
+  k.on('X', Event::pressed);
+  k.on('X', Event::released);
+  const auto presses = k.frame(false);
+  ASSERT_EQ(presses.size(), 2U);
+  EXPECT_EQ(presses[1].command, Command::saw);
+  EXPECT_TRUE(k.held(Command::suck));
+  EXPECT_TRUE(k.frame(false).empty());
+  EXPECT_FALSE(k.held(Command::suck));
+}
+
+TEST(Keyboard, AHeldKeyIsHeldUntilItIsLetGo) {
+  Keyboard k;
+  k.on('V', Event::pressed);
+  for (int frame = 0; frame < 3; ++frame) {
+    static_cast<void>(k.frame(false));
+    EXPECT_TRUE(k.held(Command::suck));
+    EXPECT_FALSE(k.held(Command::wash));
+    k.on('V', Event::repeated);
+  }
+  k.on('V', Event::released);
+  static_cast<void>(k.frame(false));
+  static_cast<void>(k.frame(false));
+  EXPECT_FALSE(k.held(Command::suck));
+}
+
+TEST(Keyboard, OnlySomeKeysRepeat) {
+  Keyboard k;
+  k.on(264, Event::pressed);  // Down
+  k.on(264, Event::repeated);
+  k.on('R', Event::pressed);
+  k.on('R', Event::repeated);
+  const auto presses = k.frame(false);
+  ASSERT_EQ(presses.size(), 3U);
+  EXPECT_EQ(presses[1].command, Command::deeper);
+  EXPECT_EQ(presses[2].command, Command::reset);
+}
+
+TEST(Keyboard, DigitsSayTheDiameter) {
+  Keyboard k;
+  for (int d = 1; d <= 7; ++d) k.on('0' + d, Event::pressed);
+  const auto presses = k.frame(false);
+  ASSERT_EQ(presses.size(), 7U);
+  for (int d = 1; d <= 7; ++d) EXPECT_EQ(presses[static_cast<std::size_t>(d - 1)].value, d);
+}
+
+// Into a field of the panel.
+TEST(Keyboard, WhatIsWrittenAsTextIsNoCommand) {
+  Keyboard k;
+  k.on('Q', Event::pressed);
+  k.on('V', Event::pressed);
+  EXPECT_TRUE(k.frame(true).empty());
+  EXPECT_FALSE(k.held(Command::suck));
+}
+
+}  // namespace
+}  // namespace osteo

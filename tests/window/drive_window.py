@@ -1,0 +1,378 @@
+#!/usr/bin/env python3
+"""Drives the window under Xvfb and checks each effect. Waits for what it wants to see, never for a time.
+usage: drive_window.py keys|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
+import csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
+
+part, bin_dir, work, source = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4])
+PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
+
+
+def osteo(*args, code=0):
+    done = subprocess.run([bin_dir / "osteo", *map(str, args)], capture_output=True, text=True)
+    assert done.returncode == code, (args, done.returncode, done.stderr)
+    return done.stdout
+
+
+def wait(what, condition):
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        found = condition()
+        if found:
+            return found
+        assert time.monotonic() < end, f"waited in vain: {what}"
+        time.sleep(0.03)
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def apart(a, b):
+    return math.dist(a, b)
+
+
+class Screen:
+    def __enter__(self):
+        read, write = os.pipe()
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x700x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as f:
+            os.environ["DISPLAY"] = ":" + f.readline().strip()
+        return self
+
+    def __exit__(self, *_):
+        self.server.kill()
+        self.server.wait()
+
+
+class Window:
+    def __init__(self, *args, case="case", before=None):
+        self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
+        self.log = open(f"{self.file}.log", "w+")
+        # Straight to the window's program, so that signals go to it whoever starts it.
+        self.app = subprocess.Popen([bin_dir / "osteo-rehearse", case, "--state-file", self.file, *map(str, args)], stderr=self.log, preexec_fn=before)
+        wait("the window's first picture", lambda: self.file.exists() or self.app.poll() is not None)
+        assert self.app.poll() is None, (self.app.returncode, self.said())
+        self.id = wait("the window", lambda: self.x("search", "--name", "^Osteotome").split())[-1]
+        wait("the first tick", lambda: self.state()["tick"] > 0)
+        self.x("mousemove", 480, 330)
+        self.next()
+
+    def x(self, *args):
+        return subprocess.run(["xdotool", *map(str, args)], capture_output=True, text=True).stdout
+
+    def said(self):
+        self.log.flush()
+        return pathlib.Path(self.log.name).read_text()
+
+    def state(self):
+        return json.loads(self.file.read_text())
+
+    def next(self, pictures=2):
+        """So many pictures later."""
+        after = self.state()["pictures"] + pictures
+        return wait("the next picture", lambda: (s := self.state())["pictures"] >= after and s)
+
+    def until(self, what, condition):
+        last = {}
+
+        def look():
+            nonlocal last
+            assert self.app.poll() is None, (what, self.app.returncode, self.said())
+            last = self.state()
+            return condition(last) and last
+
+        try:
+            return wait(what, look)
+        except AssertionError as e:
+            raise AssertionError(f"{e}; {last}; {self.said()}") from None
+
+    def key(self, key, what, condition):
+        self.x("key", key)
+        return self.until(f"{key}: {what}", condition)
+
+    def drag(self, button, dx, dy):
+        self.x("mousedown", button)
+        self.next()
+        self.x("mousemove_relative", "--", dx, dy)
+        self.next()
+        self.x("mouseup", button)
+        return self.next()
+
+    def end(self, code):
+        self.app.wait(PATIENCE_S)
+        assert self.app.returncode == code, (self.app.returncode, self.said())
+        return self.said()
+
+    def close(self, code=0):
+        self.x("key", "q")
+        return self.end(code)
+
+
+def make_case(region="temporal"):
+    osteo("phantom", "ct.nrrd", "--region", region, "--spacing-mm", "1" if region == "temporal" else "2", "--quiet")
+    osteo("prepare", "ct.nrrd", "-o", "case", "--lower", "500", "--spacing-mm", "1" if region == "temporal" else "2", "--quiet")
+
+
+def ticks(session):
+    osteo("export", session, f"{session}.csv", "--quiet", "--force")
+    with open(f"{session}.csv") as f:
+        return list(csv.DictReader(f))
+
+
+def force(row):
+    return math.hypot(*(float(row[f"force_{a}_n"]) for a in "xyz"))
+
+
+def closed(session):
+    """A session that was closed: summary and end, and it replays to the bit."""
+    summary = json.loads(pathlib.Path(session, "summary.json").read_text())
+    replayed = json.loads(osteo("replay", session, "--json", "--quiet"))
+    assert replayed["identical"] and replayed["complete"], replayed
+    assert replayed["ticks"] == summary["ticks"], (replayed, summary)
+    return summary, replayed
+
+
+def keys():
+    make_case()
+    pressed = set()
+    with Screen():
+        w = Window("--dust", "--diameter-mm", 6, "-o", "first")
+
+        def key(name, what, condition):
+            pressed.add(name)
+            return w.key(name, what, condition)
+
+        # The tool in the hand.
+        for d in range(1, 8):
+            key(str(d), "diameter", lambda s: s["tool"] == f"cutting {d} mm")
+        key("d", "diamond", lambda s: s["tool"] == "diamond 7 mm")
+        key("y", "cylinder", lambda s: s["tool"] == "diamond cylinder 7 mm")
+        key("t", "taper", lambda s: s["tool"] == "diamond taper 7 mm")
+        key("c", "cutting", lambda s: s["tool"] == "cutting taper 7 mm")
+        key("b", "ball", lambda s: s["tool"] == "cutting 7 mm")
+        key("5", "diameter", lambda s: s["tool"] == "cutting 5 mm")
+        key("space", "drill on", lambda s: s["drill_latched"] and s["drill_on"])
+        key("space", "drill off", lambda s: not s["drill_latched"] and not s["drill_on"])
+        before = w.next()
+        deeper = key("Down", "deeper", lambda s: s["goal_mm"] != before["goal_mm"])
+        assert dot([a - b for a, b in zip(deeper["goal_mm"], before["goal_mm"])], before["eye"]) < -0.2, (before, deeper)
+        key("Up", "back", lambda s: apart(s["goal_mm"], before["goal_mm"]) < 1e-6)
+        # The view, the help, a picture.
+        turned = w.drag(3, 60, 20)
+        assert dot(turned["eye"], before["eye"]) < 0.99
+        key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
+        for name in ("F1", "h"):
+            key(name, "help", lambda s: s["help"])
+            key(name, "help away", lambda s: not s["help"])
+        key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
+        # To the bone, drilled, sucked and washed, out again. A short V and a long one.
+        key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
+        down = w.state()
+        assert down["force_n"] < 1 and not down["drill_on"], down
+        w.x("mousedown", 1)
+        w.until("the button drills", lambda s: s["drill_on"])
+        for _ in range(40):
+            if w.next()["removed_mm3"] > 2:
+                break
+            w.x("click", 5 if w.state()["force_n"] > 2 else 4)
+        w.x("mouseup", 1)
+        assert w.until("drill off", lambda s: not s["drill_on"])["removed_mm3"] > 1
+        for name, state in (("v", "sucking"), ("i", "washing")):
+            w.x("keydown", name)
+            w.until(state, lambda s: s[state])
+            w.next(3)
+            assert w.state()[state]
+            w.x("keyup", name)
+            w.until(f"no longer {state}", lambda s: not s[state])
+            pressed.add(name)
+        key("u", "out", lambda s: not s["leading"] and s["message"] == "drill lifted out" and s["force_n"] == 0)
+        out = w.state()
+        assert dot([a - b for a, b in zip(out["at_mm"], out["centre_mm"])], out["eye"]) > 20, out
+        # A session of V alone holds its suction, and nothing else.
+        first = key("F5", "another session", lambda s: s["session"] != "first" and s["tick"] > 0)["session"]
+        w.x("key", "v")
+        w.next(4)
+        second = key("F5", "another session", lambda s: s["session"] != first and s["tick"] > 0)["session"]
+        # Saw, take apart, move, plate, back.
+        saw = key("x", "saw", lambda s: s["hand"] == "saw")
+        left = key("a", "saw turned", lambda s: apart(s["cut_along"], saw["cut_along"]) > 0.05)
+        key("e", "saw turned back", lambda s: apart(s["cut_along"], saw["cut_along"]) < 1e-6 and s != left)
+        key("Return", "cut", lambda s: s["undo_steps"] == 1)
+        key("z", "uncut", lambda s: s["undo_steps"] == 0)
+        key("KP_Enter", "cut again", lambda s: s["undo_steps"] == 1)
+        key("Escape", "drill", lambda s: s["hand"] == "drill")
+        key("p", "pieces", lambda s: s["hand"] == "piece")
+        apart_now = key("Return", "taken apart", lambda s: s["bodies"] > 1)
+        w.x("mousemove", 440, 330)
+        w.drag(1, 40, -20)
+        moved = w.until("piece moved", lambda s: s["places_mm"] != apart_now["places_mm"])
+        key("a", "piece turned", lambda s: s["places_mm"] != moved["places_mm"])
+        plate = key("l", "plate", lambda s: s["hand"] == "plate")
+        turned = key("a", "plate turned", lambda s: apart(s["plate_x"], plate["plate_x"]) > 0.05)
+        key("e", "plate turned back", lambda s: apart(s["plate_x"], plate["plate_x"]) < 1e-6)
+        w.x("mousemove", 440, 330)
+        w.next()
+        key("f", "plate at the bone", lambda s: not s["leading"])
+        for _ in range(20):
+            w.x("click", 4)
+            if w.next()["force_n"] > 0.5:
+                break
+        key("Return", "plate fixed", lambda s: s["fixtures"] == 1 and s["hand"] == "drill")
+        key("z", "plate off", lambda s: s["fixtures"] == 0)
+        third = key("r", "bone whole again", lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0)["session"]
+        pressed.add("q")
+        said = w.close()
+    for s in ("first", first, second, third):
+        assert s in said
+    summary, _ = closed("first")
+    assert summary["removed_mm3"] > 1 and summary["dust_mm3"]["sucked_off"] >= 0, summary
+    assert closed(first)[1]["actions"] >= 2
+    assert closed(second)[0]["sawn_mm3"] > 10
+    assert closed(third)[1]["actions"] == 0
+    assert (pathlib.Path(second) / "session.json").read_text().count("resumed_from") == 1
+    assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
+    # Each key of the table was pressed above.
+    named = {"kSpace": "space", "kEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
+    table = re.findall(r"^    \{('.'|k\w+), Command::", (source / "libs/window/src/keys.cpp").read_text(), re.M)
+    assert len(table) > 30, table
+    wanted = {k[1].lower() if k[0] == "'" else named.get(k, k[1:]) for k in table}
+    assert wanted == pressed, (wanted - pressed, pressed - wanted)
+
+
+def hand():
+    make_case("head")
+    with Screen():
+        w = Window("-o", "session")
+        seen = []
+        start = w.state()
+        for turn in range(6):
+            w.x("mousemove", 470, 330)
+            w.next()
+            s = w.key("f", "on the way", lambda s: s["leading"])
+            began = s["tick"]
+            s = w.until("arrived", lambda s: not s["leading"])
+            seen.append((s["message"], s["eye"], began, s["tick"]))
+            assert s["force_n"] < 1 and not s["drill_on"], s
+            # Pressed and drilled a little; the next F starts from there.
+            w.x("click", 4)
+            w.x("mousedown", 1)
+            w.until("drills", lambda s: s["drill_on"])
+            w.x("mouseup", 1)
+            w.until("off", lambda s: not s["drill_on"])
+            eye = s["eye"]
+            for _ in range(40):
+                w.x("mousemove", 600, 330)
+                s = w.drag(3, *((-170, 0) if turn < 4 else (0, 60)))
+                if dot(s["eye"], eye) < 0.4:
+                    break
+            assert dot(s["eye"], eye) < 0.4, (turn, s)
+        w.key("u", "out", lambda s: not s["leading"] and s["message"].startswith("drill lifted"))
+        w.close()
+    assert sum(s[0] == "drill brought to the bone" for s in seen) >= 4, seen
+    summary, _ = closed("session")
+    rows = ticks("session")
+    first = rows[0]
+    assert force(first) == 0, first
+    at = [float(first[f"{a}_mm"]) for a in "xyz"]
+    assert apart(at, start["centre_mm"]) > 60, at
+    assert len(rows) == summary["ticks"]
+    # What it was pressed with before takes a moment to go; then it is lifted, carried and set down without touching hard, drill off.
+    for _, _, began, ended in seen:
+        way = rows[began + 100 : ended]
+        assert max(map(force, way)) < 1, max(map(force, way))
+        assert not any(int(float(r["drill_on"])) for r in way)
+    print("most force on", len(seen), "ways:", max(max(map(force, rows[b + 100 : e])) for _, _, b, e in seen), "N; first tick", force(first), "N")
+
+
+def signals():
+    make_case()
+    with Screen() as screen:
+        for name, sent in (("term", [signal.SIGTERM]), ("int", [signal.SIGINT]), ("hup", [signal.SIGHUP]), ("logout", [signal.SIGTERM, signal.SIGHUP, signal.SIGTERM])):
+            w = Window("-o", name)
+            for s in sent:
+                w.app.send_signal(s)
+            said = w.end(130)
+            assert "the session is saved" in said, said
+            assert closed(name)[0]["ticks"] > 0
+        # The X server goes first, as at some logouts.
+        w = Window("-o", "display")
+        screen.server.kill()
+        said = w.end(130)
+        assert "the display is gone" in said, said
+        closed("display")
+
+
+def failures():
+    make_case()
+    # No window: nothing is left behind.
+    os.environ["DISPLAY"] = ":nowhere"
+    done = subprocess.run([bin_dir / "osteo", "rehearse", "case"], capture_output=True, text=True)
+    assert done.returncode == 7 and "no window can be opened" in done.stderr, done
+    assert not pathlib.Path("case/sessions").exists()
+    for wrong in (["--script", "x.json"], ["--fast"], ["--seconds", "5"]):
+        done = subprocess.run([bin_dir / "osteo", "rehearse", "case", *wrong], capture_output=True, text=True)
+        assert done.returncode == 2 and "needs --headless" in done.stderr, done
+    osteo("rehearse", "case", "--headless", "--width", "800", code=2)
+    # One set of flags.
+    of_window = subprocess.run([bin_dir / "osteo-rehearse", "--help"], capture_output=True, text=True).stdout
+    flags = set(re.findall(r"--[a-z][a-z-]+", of_window))
+    assert "--width" in flags and flags <= set(re.findall(r"--[a-z][a-z-]+", osteo("help", "rehearse"))), flags
+    with Screen():
+        # A folder that is taken: said at once.
+        pathlib.Path("taken").mkdir()
+        pathlib.Path("taken/file").write_text("mine")
+        done = subprocess.run([bin_dir / "osteo", "rehearse", "case", "-o", "taken", "--width", "800", "--height", "600"], capture_output=True, text=True)
+        assert done.returncode == 6 and "exists already" in done.stderr, done
+        assert os.listdir("taken") == ["file"]
+
+        # What the next session goes on from is damaged behind its back.
+        def spoil(w, folder):
+            pathlib.Path(folder, "stream.oss").write_bytes(b"not a session any more")
+            return w.key("F5", "tells what failed", lambda s: s["failure"])
+
+        w = Window("-o", "spoilt")
+        s = spoil(w, "spoilt")
+        assert s["session"] == "spoilt" and not pathlib.Path("case/sessions").exists(), s  # no empty folder of the one that was not begun
+        w.close(4)
+        # From there the case itself is a way on, and then all is well but for what was lost.
+        w = Window("-o", "spoilt-2")
+        spoil(w, "spoilt-2")
+        w.key("F5", "fails again", lambda s: s["failure"])
+        s = w.key("r", "begun anew", lambda s: not s["failure"] and s["tick"] > 0)
+        w.close(0)
+        closed(s["session"])
+
+        # No place for another session.
+        shutil.rmtree("case/sessions", ignore_errors=True)
+        pathlib.Path("case/sessions").write_text("a file")
+        w = Window("-o", "no-place")
+        s = w.key("F5", "tells what failed", lambda s: s["failure"])
+        assert "cannot make the folder" in s["failure"], s
+        w.close(6)
+        closed("no-place")
+        pathlib.Path("case/sessions").unlink()
+
+        # A disk that is full: by a limit on the size of files. The window ends with the reason, whatever key comes first.
+        def full():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
+
+        w = Window("-o", "full", before=full)
+        wait("the file is as large as it may be", lambda: pathlib.Path("full/stream.oss").stat().st_size > 100_000)
+        w.next(4)
+        if not w.state()["failure"]:
+            w.x("key", "F5")
+        s = w.until("tells what failed", lambda s: s["failure"])
+        assert "full" in s["failure"] or "write" in s["failure"], s
+        said = w.close(6)
+        assert "full" in said or "write" in said, said
+
+
+work = work.absolute()
+bin_dir, source = bin_dir.absolute(), source.absolute()
+shutil.rmtree(work, ignore_errors=True)
+work.mkdir(parents=True)
+os.chdir(work)
+os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
+{"keys": keys, "hand": hand, "signals": signals, "failures": failures}[part]()
+print(f"window {part}: all as it should be")
