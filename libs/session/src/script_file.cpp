@@ -8,6 +8,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/bone/burr.h"
 #include "osteo/bone/plates.h"
 
@@ -32,11 +33,12 @@ void cavity(double begin_s, const ordered_json& j, std::vector<Script::Waypoint>
   constexpr double kStep = 0.05, kSwaysPerS = 0.25;
   for (double t = 0; t < seconds; t += kStep) {
     const double share = t / seconds, sway = std::abs(std::fmod(kSwaysPerS * t, 2.0) - 1);
-    const double circle = rim * (1 - sway), angle = 2 * std::numbers::pi * turns * t;
+    const double circle = rim * (1 - sway);
+    const portable::SinCos turn = portable::sin_cos_turns(turns * t);
     // A bowl: less deep towards its rim.
     const double depth = deep * share * (1 - 0.4 * (circle / rim) * (circle / rim));
     if (out.empty() || begin_s + t > out.back().t_s)
-      out.push_back({begin_s + t, centre + in * depth + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+      out.push_back({begin_s + t, centre + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
   }
 }
 
