@@ -130,12 +130,12 @@ void servo(ContactMethod method, int tool) {
   TickRecord tick;
   VoxelChange change;
   std::size_t ticks = 0, changes = 0;
-  while (reader.ticks.pop(tick)) {
+  while (reader.ticks.pop(std::span(&tick, 1)) > 0) {
     tick.work_us = tick.lateness_us = 0;
     sum.add(tick);
     ++ticks;
   }
-  while (reader.changes.pop(change)) {
+  while (reader.changes.pop(std::span(&change, 1)) > 0) {
     sum.add(change);
     ++changes;
   }
