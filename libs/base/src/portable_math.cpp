@@ -98,4 +98,41 @@ double cbrt(double x) noexcept {
   return std::copysign(std::ldexp(r, third), x);
 }
 
+namespace {
+
+// The logarithm of 2 in two parts: a whole number below 2^20 times the first is exact.
+constexpr double kLn2 = 0x1.62e42fee00000p-1, kLn2Rest = 0x1.a39ef35793c76p-33;
+
+}  // namespace
+
+double exp(double x) noexcept {
+  if (std::isnan(x)) return x;
+  if (x < -708) return 0;
+  if (x > 709) return std::numeric_limits<double>::infinity();
+  const double n = std::floor(x * 0x1.71547652b82fep+0 + 0.5), r = (x - n * kLn2) - n * kLn2Rest;
+  // Taylor's series for |r| < 0.35: what is left out is below 2e-19.
+  double s = 1;
+  for (int k = 14; k >= 2; --k) s = 1 + r / k * s;
+  return std::ldexp(1 + r * s, static_cast<int>(n));
+}
+
+double log(double x) noexcept {
+  if (!(x > 0)) return x == 0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+  if (!std::isfinite(x)) return x;
+  int exponent = 0;
+  double m = std::frexp(x, &exponent);  // to [0.707, 1.414)
+  if (m < std::numbers::sqrt2 / 2) m *= 2, --exponent;
+  // log m = 2 artanh f, |f| < 0.172: what is left out is below 1e-19.
+  const double f = (m - 1) / (m + 1), z = f * f;
+  double s = 1 / 23.0;
+  for (int k = 21; k >= 3; k -= 2) s = 1.0 / k + z * s;
+  return exponent * kLn2 + (2 * f + (2 * f * (z * s) + exponent * kLn2Rest));
+}
+
+double pow(double x, double y) noexcept {
+  if (y == 0) return 1;
+  if (x == 0) return y > 0 ? 0 : std::numeric_limits<double>::infinity();
+  return exp(y * log(x));
+}
+
 }  // namespace osteo::portable

@@ -51,6 +51,21 @@ TEST(PortableMath, IsAsExactAsItSays) {
   }
   for (const double range : {1.0, 1e-6, 1e9, 1e300})
     EXPECT_LT(worst(-range, range, [](double x) { return portable::cbrt(x); }, [](long double x) { return std::cbrt(x); }, true), 5e-16) << range;
+  for (const double range : {1e-3, 1.0, 30.0, 700.0})
+    EXPECT_LT(worst(-range, range, [](double x) { return portable::exp(x); }, [](long double x) { return std::exp(x); }, true), 4e-16) << range;
+  EXPECT_LT(worst(0.3, 3, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }), 3e-16 * 28);  // down to 3e-13
+  EXPECT_LT(worst(0.9, 1.1, [](double x) { return portable::log(x) / std::max(1.0, std::abs(std::log(x))); },
+                  [](long double x) { return std::log(x) / std::max(1.0L, std::abs(std::log(x))); }),
+            3e-16);
+  EXPECT_LT(worst(1, 1e300, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }, true), 3e-16);
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> base(0, 5), exponent(-4, 4);
+  for (int n = 0; n < 200'000; ++n) {
+    const double x = base(random), y = exponent(random);
+    const long double truth = std::pow(static_cast<long double>(x), static_cast<long double>(y));
+    const auto off = static_cast<double>(std::abs(portable::pow(x, y) / truth - 1));
+    ASSERT_LT(off, (1 + std::abs(y * std::log(x))) * 5e-16) << x << " " << y;
+  }
 }
 
 TEST(PortableMath, SpecialPlaces) {
@@ -78,6 +93,15 @@ TEST(PortableMath, SpecialPlaces) {
     EXPECT_FALSE(std::isfinite(portable::atan2(x, 1)) || std::isfinite(portable::acos(x)) || std::isfinite(portable::cbrt(x)));
   }
   EXPECT_TRUE(std::isnan(portable::acos(1.0000001)));
+  EXPECT_EQ(portable::exp(0), 1);
+  EXPECT_EQ(portable::exp(-800), 0);
+  EXPECT_EQ(portable::exp(800), inf);
+  EXPECT_EQ(portable::log(1), 0);
+  EXPECT_EQ(portable::log(0), -inf);
+  EXPECT_TRUE(std::isnan(portable::log(-1)) && std::isnan(portable::exp(std::nan(""))));
+  EXPECT_EQ(portable::pow(0, 2), 0);
+  EXPECT_EQ(portable::pow(0, 0), 1);
+  EXPECT_EQ(portable::pow(1, 1e9), 1);
   for (const double x : {1.1e6, 1e15, 1e300, -1e300}) {
     const SinCos a = sin_cos(x);
     EXPECT_NEAR(a.sin * a.sin + a.cos * a.cos, 1, 1e-15) << x;
@@ -93,10 +117,11 @@ TEST(PortableMath, BitsAreTheSameEverywhere) {
     state = state * 6364136223846793005U + 1442695040888963407U;
     const double u = static_cast<double>(state >> 11) * 0x1p-52 - 1;  // [-1, 1)
     const SinCos a = sin_cos(20 * u), b = sin_cos_turns(u);
-    for (const double v : {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3), portable::hypot(u, 0.7), portable::cbrt(u)})
+    for (const double v : {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3), portable::hypot(u, 0.7), portable::cbrt(u), portable::exp(9 * u),
+                           portable::log(1.5 + u), portable::pow(1.5 + u, 1.7)})
       add(v);
   }
-  EXPECT_EQ(sum, 10919073113014175954U);
+  EXPECT_EQ(sum, 6375800630601067770U);
 }
 
 }  // namespace
