@@ -13,6 +13,7 @@
 #include "index_rows.h"
 #include "osteo/base/parallel.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/base/union_find.h"
 #include "osteo/mesh/bone_surface.h"
 #include "osteo/mesh/soup.h"
 
@@ -45,15 +46,7 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     const bool a = mask >> kEdges[e].from & 1, b = mask >> kEdges[e].to & 1;
     parent[e] = a != b ? e : std::uint8_t{12};
   }
-  const auto root = [&](std::uint8_t e) {
-    while (parent[e] != e) e = parent[e];
-    return e;
-  };
-  const auto join = [&](int a, int b) {
-    const std::uint8_t u = root(static_cast<std::uint8_t>(a)), v = root(static_cast<std::uint8_t>(b));
-    if (u < v) parent[v] = u;
-    if (v < u) parent[u] = v;
-  };
+  const auto join = [&](int a, int b) { join_sets(parent, static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b)); };
   for (unsigned f = 0; f < 6; ++f) {
     const auto& c = kFaces[f];
     std::array<int, 4> crossing{};
@@ -76,7 +69,7 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     }
   }
   Sheets result{};
-  for (std::uint8_t e = 0; e < 12; ++e) result[e] = parent[e] == 12 ? std::uint8_t{12} : root(e);
+  for (std::uint8_t e = 0; e < 12; ++e) result[e] = parent[e] == 12 ? std::uint8_t{12} : root_of(parent, e);
   return result;
 }
 

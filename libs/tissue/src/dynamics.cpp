@@ -9,6 +9,7 @@
 #include "dynamics_impl.h"
 #include "osteo/base/error.h"
 #include "osteo/base/simd.h"
+#include "osteo/base/union_find.h"
 
 namespace osteo {
 
@@ -233,7 +234,7 @@ std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
   const auto there = [&](std::uint32_t t) { return !m.cutter || m.cutter->there(t); };
   for (std::uint32_t t = 0; t < m.model.tets().size(); ++t) {
     if (!there(t)) continue;
-    for (const std::uint32_t p : m.model.tets()[t]) parent[root(p)] = root(m.model.tets()[t][0]);
+    for (const std::uint32_t p : m.model.tets()[t]) join_sets(parent, p, m.model.tets()[t][0]);
   }
   std::vector<bool> held(m.x.size());
   for (std::uint32_t p = 0; p < m.x.size(); ++p) {
