@@ -233,7 +233,7 @@ class PatchBuilder {
     const std::uint8_t sheet = sheets[static_cast<std::size_t>(edge)];
     std::uint32_t& vertex = vertex_of_[cell_index(i, j, k) * 12 + sheet];
     if (vertex != kNoVertex) return vertex;
-    std::array<std::array<float, 3>, 12> crossing, kept;  // as it is, and away from the edge's ends
+    std::array<std::array<float, 3>, 12> crossing;
     std::array<float, 3> at{0, 0, 0};
     float count = 0;
     for (std::size_t e = 0; e < 12; ++e) {
@@ -242,17 +242,22 @@ class PatchBuilder {
       const float va = block_.at(i + (a & 1), j + (a >> 1 & 1), k + (a >> 2));
       const float vb = block_.at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
       crossing[e] = {static_cast<float>(a & 1), static_cast<float>(a >> 1 & 1), static_cast<float>(a >> 2)};
-      kept[e] = crossing[e];
-      const float share = (iso_ - va) / (vb - va);
-      crossing[e][e / 4] += share;
-      kept[e][e / 4] += std::clamp(share, kFromEnds, 1 - kFromEnds);
-      for (std::size_t x = 0; x < 3; ++x) at[x] += kept[e][x];
+      const float share = (iso_ - va) / (vb - va);  // edges begin at 0
+      crossing[e][e / 4] = share;
+      for (std::size_t x = 0; x < 3; ++x) at[x] += crossing[e][x];
+      if (share < kFromEnds) at[e / 4] += kFromEnds - share;
+      if (share > 1 - kFromEnds) at[e / 4] -= share - (1 - kFromEnds);
       count += 1;
     }
     for (float& x : at) x /= count;
     const CellSheets& of = cells_[cell_index(i, j, k)];
     std::array<float, 3> g;
-    if (!sheet_normal(of, sheet, crossing, g) && !sheet_normal(of, sheet, kept, g)) g = {0, 0, 1};
+    if (!sheet_normal(of, sheet, crossing, g)) {
+      for (std::size_t e = 0; e < 12; ++e) {
+        if (sheets[e] == sheet) crossing[e][e / 4] = std::clamp(crossing[e][e / 4], kFromEnds, 1 - kFromEnds);
+      }
+      if (!sheet_normal(of, sheet, crossing, g)) g = {0, 0, 1};
+    }
     const Ijk cell{base_.i + i, base_.j + j, base_.k + k};
     const auto part = [](int x) { return static_cast<std::uint64_t>(x + 1); };
     const std::uint64_t key = ((part(cell.k) << 20 | part(cell.j)) << 20 | part(cell.i)) << 4 | sheet;
