@@ -4,6 +4,7 @@
 
 #include "bench_geometry.h"
 #include "bench_geometry_peers.h"
+#include "osteo/base/simd.h"
 #include "osteo/distance/live_distance.h"
 #include "osteo/distance/mask_distance.h"
 #include "osteo/distance/swept_distance.h"
@@ -69,7 +70,7 @@ void distance_tables(const Context& context, const fs::path& folder) {
       "the resolution. CPU seconds on one thread, surface in to map out; ours with tree, voxels and sign included, the peers' with the "
       "list of points given "
       "and, but for VTK's, without sign. Instruction set: %s.\n\n",
-      std::string(simd_name()).c_str());
+      simd_name(simd()).data());
   std::printf(
       "| surface | resolution | voxels | ours | ours, 2 threads (wall) | thesis as printed | thesis corrected | breadth first | Embree + "
       "hint | CGAL AABB | thesis corrected / ours | Embree / ours | CGAL / ours | published 2006 |\n");

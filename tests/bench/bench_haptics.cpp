@@ -13,6 +13,7 @@
 
 #include "bench.h"
 #include "duck.h"
+#include "osteo/base/simd.h"
 #include "osteo/grid/resample.h"
 #include "osteo/haptics/fields.h"
 #include "osteo/haptics/servo.h"
@@ -304,7 +305,7 @@ void bench_kernel(const Context& context) {
   std::printf(
       "\nVectors: %s. One overlap of a 6 mm burr buried to its middle, deepest case:\n\n| voxels mm | us | voxels under it | of them a ms "
       "|\n|---|---|---|---|\n",
-      overlap_simd_name());
+      simd_name(simd()).data());
   for (const double h : {1.0, 0.5, 0.25, 0.2}) {
     const auto bone = test::slab(h);
     Overlap overlap(0);

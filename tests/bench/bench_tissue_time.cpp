@@ -6,6 +6,7 @@
 
 #include "bench_tissue.h"
 #include "mapped.h"
+#include "osteo/base/simd.h"
 #include "osteo/tets/skin.h"
 #include "osteo/tissue/dynamics.h"
 #include "osteo/tissue/implicit.h"
@@ -140,7 +141,7 @@ void throughput() {
       "### Steps in time, one core (%s), cubes of voxels\n\n| tetrahedra | certified step ms | closed form, float: tets/ms | steps/s | "
       "double | thesis' constraints (edges, faces, tetrahedra) in the same loops | thesis' structure (points gather) | one pass of XPBD "
       "|\n|---|---|---|---|---|---|---|---|\n",
-      tissue_simd_name());
+      simd_name(simd()).data());
   for (const int n : {14, 22, 40}) {
     const auto b = test::block(n, n, n, 5);
     const Material m{0.1, 0.45};

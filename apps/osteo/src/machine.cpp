@@ -15,8 +15,8 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/simd.h"
 #include "osteo/devices/devices.h"
-#include "osteo/haptics/overlap.h"
 #include "osteo/rt/loop.h"
 #include "osteo/view/offscreen.h"
 
@@ -173,7 +173,7 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   j["cores"] = std::thread::hardware_concurrency();
   j["kernel"] = std::string(u.sysname) + " " + u.release;
   j["kernel_is_realtime"] = fs::exists("/sys/kernel/realtime");
-  j["vector_instructions"] = overlap_simd_name();
+  j["vector_instructions"] = simd_name(simd());
 
   io.context.progress(0.1, "measuring the loop");
   FixedRateLoop loop(p.rate_hz, [end = monotonic_ns() + static_cast<std::int64_t>(p.seconds * 1e9)](std::int64_t) {
@@ -243,7 +243,7 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
   const auto yes = [](bool v) { return v ? "yes" : "NO"; };
   const auto& late = j["loop"]["lateness"];
   io.out << j["processor"].get<std::string>() << ", " << j["cores"] << " cores, " << j["kernel"].get<std::string>()
-         << (j["kernel_is_realtime"].get<bool>() ? " (real-time)" : "") << ", vectors: " << overlap_simd_name() << '\n'
+         << (j["kernel_is_realtime"].get<bool>() ? " (real-time)" : "") << ", vectors: " << simd_name(simd()) << '\n'
          << "real-time priority  " << yes(s.realtime_granted) << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")")
          << '\n'
          << "memory locked       " << yes(s.memory_locked) << '\n'

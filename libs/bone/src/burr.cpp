@@ -6,6 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
+#include "osteo/base/portable_math.h"
 
 namespace osteo {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 constexpr double kShaftDiameterMm = 2.35, kShaftLengthMm = 60;
 
 float efficiency_at(const Burr& burr, double sine_of_latitude) {
-  const double latitude = std::asin(std::clamp(std::abs(sine_of_latitude), 0.0, 1.0));
+  const double latitude = portable::asin(std::clamp(std::abs(sine_of_latitude), 0.0, 1.0));
   return static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n));
 }
 
@@ -84,7 +85,7 @@ int burr_index(BurrKind kind, double diameter_mm, BurrShape shape) {
 BurrSamples sample_burr(const Burr& burr) {
   constexpr double kSamples = 3000;
   const RoundCone head = burr.head();
-  const double r = head.largest_radius_mm(), volume = head.volume_mm3(), pitch = std::cbrt(volume / kSamples);
+  const double r = head.largest_radius_mm(), volume = head.volume_mm3(), pitch = portable::cbrt(volume / kSamples);
   BurrSamples s;
   const int n = static_cast<int>(std::ceil(r / pitch)) + 1, top = n + static_cast<int>(std::ceil(head.length_mm / pitch));
   for (int k = -n; k <= top; ++k) {
@@ -92,7 +93,7 @@ BurrSamples sample_burr(const Burr& burr) {
       for (int i = -n; i <= n; ++i) {
         const Vec3 p{(i + 0.5) * pitch, (j + 0.5) * pitch, (k + 0.5) * pitch};
         if (head.distance_mm(p) > 0) continue;
-        const Vec3 inward = normalized(Vec3{0, 0, head.foot_mm(std::hypot(p.x, p.y), p.z)} - p);
+        const Vec3 inward = normalized(Vec3{0, 0, head.foot_mm(portable::hypot(p.x, p.y), p.z)} - p);
         s.offset_mm.push_back(to_floats(p));
         s.inward.push_back(to_floats(inward));
         s.efficiency.push_back(efficiency_at(burr, inward.z));
@@ -128,7 +129,8 @@ BurrSurface sample_burr_surface(const Burr& burr, int samples) {
       radius = h.radius_at_mm(foot);
     }
     const double flat = std::sqrt(std::max(0.0, 1 - normal_z * normal_z));
-    const Vec3 normal{flat * std::cos(angle), flat * std::sin(angle), normal_z};
+    const portable::SinCos round = portable::sin_cos(angle);
+    const Vec3 normal{flat * round.cos, flat * round.sin, normal_z};
     s.offset_mm.push_back(to_floats(Vec3{0, 0, foot} + normal * radius));
     s.inward.push_back(to_floats(-normal));
     s.reach_mm.push_back(static_cast<float>(radius));

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "osteo/base/files.h"
+#include "osteo/base/portable_math.h"
 
 namespace osteo {
 namespace {
@@ -285,7 +286,7 @@ void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {
       if (to == c || solid(to) || !in_reach(to)) continue;
       const Vec3 q = frame.world_from_index({double(to.i), double(to.j), double(to.k)}) - start_mm - axis * tool.start_mm;
       const double along = dot(q, axis), off = length(q - axis * along), its_foot = tool.foot_mm(off, along);
-      if (std::hypot(off, along - its_foot) < tool.radius_at_mm(its_foot)) continue;
+      if (portable::hypot(off, along - its_foot) < tool.radius_at_mm(its_foot)) continue;
       *cell(to, true) += units;
       units = 0;
       wake(to);

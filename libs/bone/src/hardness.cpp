@@ -6,13 +6,14 @@
 #include "hardness_json.h"
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/grid/sampler.h"
 
 namespace osteo {
 
 double HardnessLaw::at(double hu) const {
   const double density = std::max(0.0, (hu - zero_hu) / (cortical_hu - zero_hu));
-  return std::clamp(exponent == 1 ? density : std::pow(density, exponent), least, most);
+  return std::clamp(exponent == 1 ? density : portable::pow(density, exponent), least, most);
 }
 
 HardnessLaw parse_hardness(std::string_view text, const std::string& name) {

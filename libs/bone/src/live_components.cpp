@@ -3,21 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "osteo/base/union_find.h"
+
 namespace osteo {
 namespace {
 
 constexpr float kSolid = 0.5F;
-
-std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-// The lower number becomes the root, so that the outcome does not depend on the order of joining.
-void join(std::vector<std::uint32_t>& parent, std::uint32_t a, std::uint32_t b) {
-  a = find(parent, a);
-  b = find(parent, b);
-  if (a != b) parent[std::max(a, b)] = std::min(a, b);
-}
 
 }  // namespace
 
@@ -78,10 +69,6 @@ void LiveComponents::label(std::uint32_t number) {
     if (density[v] >= kSolid) brick.solid[v >> 6] |= 1ULL << (v & 63);
   }
   std::array<std::uint16_t, 512> parent;
-  const auto root = [&](std::uint16_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
   const auto solid = [&](int i, int j, int k) { return (brick.solid[static_cast<std::size_t>(k)] >> (j * 8 + i) & 1) != 0; };
   for (std::uint16_t v = 0; v < 512; ++v) parent[v] = v;
   for (int k = 0; k < 8; ++k) {
@@ -92,9 +79,7 @@ void LiveComponents::label(std::uint32_t number) {
         for (const Ijk s : steps_) {
           const int x = i + s.i, y = j + s.j, z = k + s.k;
           if (((x | y | z) & ~7) != 0 || !solid(x, y, z)) continue;
-          const std::uint16_t a = root(static_cast<std::uint16_t>(k * 64 + j * 8 + i)),
-                              b = root(static_cast<std::uint16_t>(z * 64 + y * 8 + x));
-          if (a != b) parent[std::max(a, b)] = std::min(a, b);
+          join_sets(parent, static_cast<std::uint16_t>(k * 64 + j * 8 + i), static_cast<std::uint16_t>(z * 64 + y * 8 + x));
         }
       }
     }
@@ -103,7 +88,7 @@ void LiveComponents::label(std::uint32_t number) {
   std::array<std::uint8_t, 512> name{};
   for (std::uint16_t v = 0; v < 512; ++v) {
     if ((brick.solid[v >> 6] >> (v & 63) & 1) == 0) continue;
-    const std::uint16_t r = root(v);
+    const std::uint16_t r = root_of(parent, v);
     if (r == v) {
       // At most 256 parts: no two of them touch.
       name[v] = static_cast<std::uint8_t>(brick.parts.size());
@@ -197,7 +182,7 @@ void LiveComponents::join_parts() {
   parent_.resize(parts);
   for (std::uint32_t p = 0; p < parts; ++p) parent_[p] = p;
   for (const Brick& b : bricks_) {
-    for (const Link& l : b.links) join(parent_, b.first_part + l.from, bricks_[l.brick].first_part + l.to);
+    for (const Link& l : b.links) join_sets(parent_, b.first_part + l.from, bricks_[l.brick].first_part + l.to);
   }
   component_of_part_.assign(parts, kNone);
   components_.clear();
@@ -209,7 +194,7 @@ void LiveComponents::join_parts() {
   for (std::uint32_t number = 0; number < bricks_.size(); ++number) {
     const Brick& b = bricks_[number];
     for (std::uint32_t p = 0; p < b.parts.size(); ++p) {
-      const std::uint32_t r = find(parent_, b.first_part + p);
+      const std::uint32_t r = root_of(parent_, b.first_part + p);
       if (component_of_part_[r] == kNone) {
         component_of_part_[r] = static_cast<std::uint32_t>(components_.size());
         components_.push_back({});

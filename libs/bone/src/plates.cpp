@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "osteo/base/error.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
@@ -35,16 +36,16 @@ TriMesh surface_of(const std::function<double(Vec3)>& distance, Vec3 lo, Vec3 hi
 }
 
 double to_segment(double x, double y, double x0, double x1) {
-  return std::hypot(x - std::clamp(x, x0, x1), y);
+  return portable::hypot(x - std::clamp(x, x0, x1), y);
 }
 
 // A row of rings joined by a bar, with screw holes; `holes` ascending along x.
 double strip(Vec3 p, const std::vector<Vec3>& holes, double ring_mm, double bar_mm, double hole_mm, double thickness_mm) {
   double flat = to_segment(p.x, p.y, holes.front().x, holes.back().x) - bar_mm / 2;
-  for (const Vec3 c : holes) flat = std::min(flat, std::hypot(p.x - c.x, p.y - c.y) - ring_mm / 2);
-  for (const Vec3 c : holes) flat = std::max(flat, hole_mm / 2 - std::hypot(p.x - c.x, p.y - c.y));
+  for (const Vec3 c : holes) flat = std::min(flat, portable::hypot(p.x - c.x, p.y - c.y) - ring_mm / 2);
+  for (const Vec3 c : holes) flat = std::max(flat, hole_mm / 2 - portable::hypot(p.x - c.x, p.y - c.y));
   const double high = std::abs(p.z - thickness_mm / 2) - thickness_mm / 2;
-  return flat > 0 && high > 0 ? std::hypot(flat, high) : std::max(flat, high);
+  return flat > 0 && high > 0 ? portable::hypot(flat, high) : std::max(flat, high);
 }
 
 struct StripPlan {
@@ -86,8 +87,8 @@ PlateModel make_distractor() {
     right.push_back({4.0 + 6 * i, 0, 0});
   }
   const auto rod = [&](Vec3 p, double x0, double x1, double radius) {
-    const double round = std::hypot(p.y, p.z - kRodHeight) - radius, along = std::max(x0 - p.x, p.x - x1);
-    return round > 0 && along > 0 ? std::hypot(round, along) : std::max(round, along);
+    const double round = portable::hypot(p.y, p.z - kRodHeight) - radius, along = std::max(x0 - p.x, p.x - x1);
+    return round > 0 && along > 0 ? portable::hypot(round, along) : std::max(round, along);
   };
   const auto block = [&](Vec3 p, double x) {
     return std::max({std::abs(p.x - x) - 1.5, std::abs(p.y) - kBlock / 2, 0.5 - p.z, p.z - kRodHeight - kBlock / 2});
@@ -154,7 +155,7 @@ std::vector<PlateSample> sample_plate(const PlateModel& plate, int count, double
     const Vec3 m = (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3;
     const Vec3 n = cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
     // Underside, top, sides apart; within them by strips across.
-    const int side = std::abs(n.z) > std::hypot(n.x, n.y) ? (n.z < 0 ? 0 : 1) : 2;
+    const int side = std::abs(n.z) > portable::hypot(n.x, n.y) ? (n.z < 0 ? 0 : 1) : 2;
     return std::make_tuple(side, std::lround(m.x / 1.0), m.y);
   };
   std::vector<std::tuple<int, long, double>> cells;

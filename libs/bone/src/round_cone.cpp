@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "osteo/base/portable_math.h"
+
 namespace osteo {
 
 double RoundCone::foot_mm(double radial_mm, double axial_mm) const {
@@ -12,8 +14,8 @@ double RoundCone::foot_mm(double radial_mm, double axial_mm) const {
 }
 
 double RoundCone::distance_mm(Vec3 p) const {
-  const double radial = std::hypot(p.x, p.y), axial = p.z - start_mm, t = foot_mm(radial, axial);
-  return std::hypot(radial, axial - t) - radius_at_mm(t);
+  const double radial = portable::hypot(p.x, p.y), axial = p.z - start_mm, t = foot_mm(radial, axial);
+  return portable::hypot(radial, axial - t) - radius_at_mm(t);
 }
 
 double RoundCone::volume_mm3() const {
@@ -48,7 +50,7 @@ namespace {
 double segment_area(double r, double c) {
   if (c >= r) return 0;
   if (c <= -r) return std::numbers::pi * r * r;
-  return r * r * std::acos(c / r) - c * std::sqrt(r * r - c * c);
+  return r * r * portable::acos(c / r) - c * std::sqrt(r * r - c * c);
 }
 
 // Volume of the shape beyond the plane at `depth` below its farthest point in the direction (sine, cosine).

@@ -64,11 +64,11 @@ std::vector<Data> SawStage::run(const Params& p, std::span<const Data> inputs, c
 StageInfo PiecesStage::info() {
   return {
       .name = "pieces",
-      .version = 1,
+      .version = 2,
       .synopsis = "bone taken apart into what hangs together",
       .description =
           "Finds the parts that no longer hang together, with mass (from density), centre and inertia; drops crumbs; writes the surface of "
-          "all pieces, moved apart for a look when asked, and the bone of one or all.",
+          "all pieces, each enclosing what its bone measures, moved apart for a look when asked, and the bone of one or all.",
       .inputs = {{"bone", {DataKind::grid}, "density, as resample or saw make it"}},
       .outputs = {{"pieces", {DataKind::document}, "the pieces, largest first, in JSON"},
                   {"surface", {DataKind::surface}, "closed, one body or more a piece", true},
@@ -104,11 +104,14 @@ std::vector<Data> PiecesStage::run(const Params& p, std::span<const Data> inputs
     nlohmann::ordered_json inertia = nlohmann::ordered_json::array();
     // About the centre, for a density of 1 g/cm3 where bone is whole: g mm2.
     for (const double i : piece.solid.inertia_mm2) inertia.push_back(i * voxel / 1000);
+    const VolumeSurface surface = surface_of_volume(piece.bone, context);
     j["pieces"].push_back({{"volume_mm3", piece.volume_mm3()},
+                           {"surface_volume_mm3", surface.surface_mm3},
+                           {"surface_moved_mm", surface.moved_mm},
                            {"centre_mm", {piece.solid.centre_mm.x, piece.solid.centre_mm.y, piece.solid.centre_mm.z}},
                            {"inertia_g_mm2_at_1_g_per_cm3", inertia},
                            {"moved_mm", {away.x, away.y, away.z}}});
-    const TriMesh mesh = surface_nets(piece.bone, 0.5F, context).mesh;
+    const TriMesh& mesh = surface.mesh;
     const auto first = static_cast<std::uint32_t>(all.points_mm.size());
     for (const auto& q : mesh.points_mm)
       all.points_mm.push_back({q[0] + static_cast<float>(away.x), q[1] + static_cast<float>(away.y), q[2] + static_cast<float>(away.z)});

@@ -80,6 +80,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
 
 TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, bool remove_self_intersections, CgalRepairReport& report,
                               const Context& context) {
+  report = {};
   const Ordered used = ordered(surface, context);
   std::vector<K::Point_3> points;
   for (const Vec3 p : used.soup.points_mm) points.emplace_back(p.x, p.y, p.z);

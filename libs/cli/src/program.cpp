@@ -8,6 +8,7 @@
 #include "describe.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/simd.h"
 #include "osteo/cli/command.h"
 #include "osteo/cli/report.h"
 #include "osteo/pipeline/pipeline.h"
@@ -292,6 +293,7 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
     return fail(e, json, out, err);
   };
   try {
+    static_cast<void>(simd());  // an unknown OSTEO_SIMD is told by every command
     const int code = dispatch(program, args, out, err, printer);
     if (printer) printer->clear();
     out.flush();

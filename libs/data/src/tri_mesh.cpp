@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "osteo/base/union_find.h"
+
 namespace osteo {
 namespace {
 
@@ -30,10 +32,6 @@ std::uint64_t count_nonmanifold_points(const TriMesh& mesh) {
     if (count < 2) continue;
     parent.resize(count);
     for (std::uint32_t i = 0; i < count; ++i) parent[i] = i;
-    const auto root = [&](std::uint32_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
     std::uint32_t fans = count;
     for (std::uint32_t i = 0; i < count; ++i) {
       for (std::uint32_t j = i + 1; j < count; ++j) {
@@ -41,12 +39,7 @@ std::uint64_t count_nonmanifold_points(const TriMesh& mesh) {
         for (const auto a : mesh.triangles[incident[begin + i]]) {
           for (const auto b : mesh.triangles[incident[begin + j]]) shared += a == b ? 1 : 0;
         }
-        if (shared < 2) continue;
-        const auto ri = root(i), rj = root(j);
-        if (ri != rj) {
-          parent[ri] = rj;
-          --fans;
-        }
+        if (shared >= 2 && join_sets(parent, i, j)) --fans;
       }
     }
     if (fans > 1) ++bad;

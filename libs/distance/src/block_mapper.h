@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "osteo/base/portable_math.h"
 #include "osteo/data/frame.h"
 #include "tree_data.h"
 
@@ -261,7 +262,7 @@ inline int start_edge(double density) {
   return best_edge;
 }
 inline int start_edge(const TriangleTree::Data& tree, const Frame& frame) {
-  const double face = std::cbrt(frame.voxel_volume_mm3()) / tree.unit_mm;
+  const double face = portable::cbrt(frame.voxel_volume_mm3()) / tree.unit_mm;
   return start_edge(tree.area > 0 ? std::max(1e-6, tree.view.triangles / (tree.area / (face * face))) : 1.0);
 }
 

@@ -66,7 +66,6 @@ struct Nearest {
 };
 
 struct Kernel {
-  const char* name;
   /// For each wanted child keeps the triangles that can be nearest to any of its points.
   void (*filter)(FilterTask&);
   /// d2[i] of voxel i to triangle ids[i]. A voxel is x + 16 y + 256 z; its centre is origin + step * (x, y, z).
@@ -91,9 +90,7 @@ extern const Kernel kAvx2;
 extern const Kernel kAvx512;
 #endif
 
-/// The best this machine has, or the one that OSTEO_SIMD (scalar, avx2, avx512) names.
+/// The one for simd().
 const Kernel& kernel();
-/// By name; nullptr when the machine lacks it.
-const Kernel* kernel_named(const char* name);
 
 }  // namespace osteo::distance

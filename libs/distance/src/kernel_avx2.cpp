@@ -135,7 +135,7 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
 
 }  // namespace
 
-const Kernel kAvx2{"avx2", filter, measure_voxels, measure_block, closest, collect};
+const Kernel kAvx2{filter, measure_voxels, measure_block, closest, collect};
 
 }  // namespace osteo::distance
 #endif

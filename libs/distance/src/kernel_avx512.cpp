@@ -134,7 +134,7 @@ inline void load_exact(const ExactTriangle* exact, const std::uint32_t* ids, D* 
 
 }  // namespace
 
-const Kernel kAvx512{"avx512", filter, measure_voxels, measure_block, closest, collect};
+const Kernel kAvx512{filter, measure_voxels, measure_block, closest, collect};
 
 }  // namespace osteo::distance
 #pragma GCC diagnostic pop

@@ -71,6 +71,6 @@ Lanes load_records(const TriangleRecord* records, const std::uint32_t* ids) {
 }
 }  // namespace
 
-const Kernel kScalar{"scalar", filter, measure_voxels, measure_block, closest, collect};
+const Kernel kScalar{filter, measure_voxels, measure_block, closest, collect};
 
 }  // namespace osteo::distance

@@ -2,34 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <string>
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
+#include "osteo/base/simd.h"
 #include "tree_data.h"
 
 namespace osteo {
 namespace distance {
 
-const Kernel* kernel_named(const char* name) {
-  if (std::strcmp(name, "scalar") == 0) return &kScalar;
-#if defined(__x86_64__)
-  if (std::strcmp(name, "avx512") == 0 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) return &kAvx512;
-  if (std::strcmp(name, "avx2") == 0 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &kAvx2;
-#endif
-  return nullptr;
-}
-
 const Kernel& kernel() {
   static const Kernel* const chosen = [] {
-    if (const char* wanted = std::getenv("OSTEO_SIMD"); wanted != nullptr) {
-      if (const Kernel* k = kernel_named(wanted); k != nullptr) return k;
-    }
-    for (const char* name : {"avx512", "avx2"}) {
-      if (const Kernel* k = kernel_named(name); k != nullptr) return k;
-    }
+#if defined(__x86_64__)
+    if (simd() == Simd::avx512) return &kAvx512;
+    if (simd() == Simd::avx2) return &kAvx2;
+#endif
     return &kScalar;
   }();
   return *chosen;
@@ -223,8 +211,10 @@ TriangleTree::TriangleTree(const TriangleSoup& soup, const Mat3& axes, const Con
   const auto [lo, hi] = bounds_of(soup);
   d.centre_mm = (lo + hi) * 0.5;
   const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
-  d.unit_mm = extent > 0 ? std::exp2(std::ceil(std::log2(extent)) - 7) : 1.0;  // the extent becomes 64 to 128 units
-  if (!(d.unit_mm > 0) || !std::isfinite(d.unit_mm))
+  int exponent = 0;
+  static_cast<void>(std::frexp(extent, &exponent));
+  d.unit_mm = extent > 0 ? std::ldexp(1, exponent - 7) : 1.0;  // the extent becomes 64 to 128 units
+  if (!(d.unit_mm > 0) || !std::isfinite(extent))
     throw Error(ExitCode::corrupt, "the surface's extent is not a number that can be worked with");
   std::vector<Vec3> points(soup.points_mm.size());
   parallel_for(points.size(), 8192, context.threads, [&](std::size_t begin, std::size_t end) {
@@ -316,10 +306,6 @@ ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   distance::kScalar.measure_voxels(&t, &id, &id, 1, zero, zero, &d2);
   const distance::Place place = distance::place_on(t, Vec3{});
   return {std::sqrt(d2), 0, place.feature, place.point + p};
-}
-
-std::string_view simd_name() {
-  return distance::kernel().name;
 }
 
 }  // namespace osteo

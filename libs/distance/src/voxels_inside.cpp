@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
+#include "osteo/base/union_find.h"
 #include "osteo/distance/voxelize.h"
 #include "winding.h"
 
@@ -13,12 +14,9 @@ namespace osteo {
 std::vector<Fan> closing_fans(const Ordered& surface, const std::vector<Vec3>& points) {
   std::vector<std::uint32_t> parent(points.size());
   for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  const auto root = [&](std::uint32_t i) { return root_of(parent, i); };
   if (surface.open.empty()) return {};
-  for (const OpenEdge& e : surface.open) parent[std::max(root(e.from), root(e.to))] = std::min(root(e.from), root(e.to));
+  for (const OpenEdge& e : surface.open) join_sets(parent, e.from, e.to);
   std::vector<Vec3> sum(points.size());
   std::vector<int> count(points.size(), 0);
   for (const OpenEdge& e : surface.open) {

@@ -3,9 +3,9 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "osteo/base/portable_math.h"
 #include "osteo/distance/fan.h"
 #include "osteo/mesh/soup.h"
 
@@ -22,7 +22,7 @@ namespace osteo {
   const double det = dot(a, cross(b, c));
   const double along = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
   if (det == 0 && along == 0) return 0;
-  return 2 * std::atan2(det, along);
+  return 2 * portable::atan2(det, along);
 }
 
 /// Where the plane z = `level` cuts a triangle: at (y[0], x[0]) the edge that goes up in z, at [1] the one that goes down.

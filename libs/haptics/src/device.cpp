@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "osteo/base/portable_math.h"
+
 namespace osteo {
 namespace {
 
@@ -83,7 +85,7 @@ DeviceSample GuidedHand::step(HandGoal& goal, double dt_s, Vec3 force_n) noexcep
     } else if (leg_ < now_.way.count) {
       const HandWay::Point& to = now_.way.points[leg_];
       const Vec3 along = to.at_mm - from_mm_, to_axis = from_floats(to.axis);
-      const double turn = std::acos(std::clamp(dot(from_axis_, to_axis), -1.0, 1.0));
+      const double turn = portable::acos(std::clamp(dot(from_axis_, to_axis), -1.0, 1.0));
       const double seconds = std::max(length(along) / (to.near_bone ? kNearMmPerS : kFreeMmPerS), turn / kRadPerS);
       const bool touches = length(force_n) > kTouchN;
       const double ahead = touches ? kTouchAheadMm : to.near_bone ? kNearAheadMm : kFreeAheadMm;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "osteo/base/error.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/grid/sampler.h"
 
@@ -120,7 +121,7 @@ MeshField::MeshField(const TriangleSoup& soup, bool shading, const Context& cont
     face_normal_[t] = normalized(cross(p[1] - p[0], p[2] - p[0]));  // zero for a triangle without area: it has no say
     for (std::size_t c = 0; c < 3; ++c) {
       const Vec3 u = normalized(p[(c + 1) % 3] - p[c]), v = normalized(p[(c + 2) % 3] - p[c]);
-      corner_normal_[tri[c]] += face_normal_[t] * std::acos(std::clamp(dot(u, v), -1.0, 1.0));
+      corner_normal_[tri[c]] += face_normal_[t] * portable::acos(std::clamp(dot(u, v), -1.0, 1.0));
       edges[key(tri[c], tri[(c + 1) % 3])] += face_normal_[t];
     }
   }

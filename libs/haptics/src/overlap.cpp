@@ -2,25 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <string_view>
 
+#include "osteo/base/simd.h"
 #include "overlap_kernel.h"
 
 namespace osteo {
 namespace overlap {
 
 BrickFunction brick_function() {
-  static const BrickFunction chosen = [] {
 #if defined(__x86_64__)
-    const char* const wish = std::getenv("OSTEO_SIMD");
-    const std::string_view most = wish != nullptr ? wish : "avx512";
-    if (most == "avx512" && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) return &brick_avx512;
-    if (most != "scalar" && __builtin_cpu_supports("avx2")) return &brick_avx2;
+  if (simd() == Simd::avx512) return &brick_avx512;
+  if (simd() == Simd::avx2) return &brick_avx2;
 #endif
-    return &brick_base;
-  }();
-  return chosen;
+  return &brick_base;
 }
 
 const GrainFunctions& grain_functions() {
@@ -55,13 +49,9 @@ Vec3 density_slope(const BrickGrid& bone, VoxelKey voxel) noexcept {
 
 }  // namespace
 
-const char* overlap_simd_name() {
-  const auto f = overlap::brick_function();
-  return f == &overlap::brick_avx512 ? "avx512" : f == &overlap::brick_avx2 ? "avx2" : "base";
-}
-
 struct Overlap::PartialBuffer {
   std::vector<overlap::Partial> items;
+  overlap::BrickFunction brick = overlap::brick_function();  // here: an unknown OSTEO_SIMD is told now, not in a tick
 };
 
 Overlap::Overlap(std::size_t most_hits) : hits_(most_hits + 512), partial_(std::make_unique<PartialBuffer>()) {
@@ -99,7 +89,7 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
   // Along the axis in pieces, so that an oblique shaft does not visit the whole box around it. A brick belongs to the piece its
   // middle projects onto; the first and the last reach beyond the ends.
   constexpr double kHalf = 3.5, kCorner = 6.95;  // of a brick: to its middle, and to a voxel's far corner
-  const overlap::BrickFunction brick = overlap::brick_function();
+  const overlap::BrickFunction brick = partial_->brick;
   const int pieces = std::max(1, static_cast<int>(std::ceil(length / 24)));
   for (int piece = 0; piece < pieces; ++piece) {
     const double t0 = length * piece / pieces, t1 = length * (piece + 1) / pieces;

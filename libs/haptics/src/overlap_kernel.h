@@ -51,7 +51,7 @@ using BrickFunction = void (*)(const Shape& shape, const float* values, const fl
 void brick_base(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
 void brick_avx2(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
 void brick_avx512(const Shape&, const float*, const float*, VoxelKey, Sums&, HitList&, PartialList&);
-/// The widest that this machine has, or what OSTEO_SIMD names; all give the same bits.
+/// The one for simd(); all give the same bits.
 BrickFunction brick_function();
 
 /// A voxel's grains: parts^3 cubes, x fastest, of 64 points each, one word of bits a cube.

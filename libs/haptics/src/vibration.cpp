@@ -2,11 +2,11 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/base/portable_math.h"
 #include "vibration_json.h"
 
 namespace osteo {
@@ -64,8 +64,9 @@ std::array<double, 2> Vibration::step(BurrKind kind, double pressed_n, double dt
     // Above what the loop can play without aliasing.
     if (peak.frequency_hz * dt_s > 0.45) continue;
     const double amplitude = peak.idle_n + peak.per_n * pressed_n;
-    force[0] += amplitude * std::cos(2 * std::numbers::pi * phase);
-    force[1] += amplitude * std::sin(2 * std::numbers::pi * phase);
+    const portable::SinCos turn = portable::sin_cos_turns(phase);
+    force[0] += amplitude * turn.cos;
+    force[1] += amplitude * turn.sin;
   }
   return force;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "osteo/base/union_find.h"
+
 namespace osteo {
 
 Components connected_components(std::span<const std::uint8_t> mask, std::array<int, 3> dims, std::uint8_t value,
@@ -37,21 +39,13 @@ Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, 
 
   std::vector<std::uint32_t> parent(result.runs.size());
   std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
   // Runs of two rows touch when they overlap; with 26 neighbours also when they meet corner to corner.
   const std::uint32_t reach = connectivity == Connectivity::full ? 1 : 0;
   const auto join_rows = [&](std::uint32_t a, std::uint32_t b) {
     std::uint32_t i = first[a], j = first[b];
     while (i < first[a + 1] && j < first[b + 1]) {
       const Run &r = result.runs[i], &s = result.runs[j];
-      if (r.begin < s.end + reach && s.begin < r.end + reach) {
-        const std::uint32_t u = root(i), v = root(j);
-        if (u < v) parent[v] = u;
-        if (v < u) parent[u] = v;
-      }
+      if (r.begin < s.end + reach && s.begin < r.end + reach) join_sets(parent, i, j);
       if (r.end < s.end) {
         ++i;
       } else {
@@ -71,7 +65,7 @@ Components connected_components(std::vector<Run> runs, std::array<int, 3> dims, 
 
   result.component.resize(result.runs.size());
   for (std::uint32_t i = 0; i < result.runs.size(); ++i) {
-    const std::uint32_t r = root(i);
+    const std::uint32_t r = root_of(parent, i);
     if (r == i) {
       result.component[i] = static_cast<std::uint32_t>(result.voxels.size());
       result.voxels.push_back(0);

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <string>
 
+#include "curve_kernel.h"
 #include "osteo/base/error.h"
+#include "osteo/base/simd.h"
 
 namespace osteo {
 
-Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end()) {
+Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end()), loops_(&Loops::chosen()) {
   if (points_.size() < 2) throw Error(ExitCode::corrupt, "a curve needs at least two points; this has " + std::to_string(points_.size()));
   Vec3 lo = points_[0], hi = points_[0];
   arcs_.reserve(points_.size());
@@ -89,34 +91,12 @@ Curve::Curve(std::span<const Vec3> points) : points_(points.begin(), points.end(
   }
 }
 
-// Compiled for wider vectors too; which one runs is chosen when the program starts. The same bits from each.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
-#define OSTEO_WIDE __attribute__((target_clones("avx512f", "avx2", "default"), optimize("O3")))
-#else
-#define OSTEO_WIDE
+const Curve::Loops& Curve::Loops::chosen() {
+#if defined(__x86_64__)
+  if (simd() == Simd::avx512) return avx512;
+  if (simd() == Simd::avx2) return avx2;
 #endif
-
-// Lower bounds of the score on sixteen segments: the distance to each, and the way to its nearer end.
-OSTEO_WIDE void Curve::leaf_bounds(const Leaf& g, const float p[3], float arc, float penalty, float out[16]) {
-  for (int i = 0; i < 16; ++i) {
-    const float x = p[0] - g.at[0][i], y = p[1] - g.at[1][i], z = p[2] - g.at[2][i];
-    const float foot = std::min(std::max(x * g.direction[0][i] + y * g.direction[1][i] + z * g.direction[2][i], 0.0F), g.length[i]);
-    const float rx = x - foot * g.direction[0][i], ry = y - foot * g.direction[1][i], rz = z - foot * g.direction[2][i];
-    const float way = std::max(std::max(g.arc[i] - arc, arc - g.arc[i] - g.length[i]), 0.0F);
-    out[i] = __builtin_sqrtf(rx * rx + ry * ry + rz * rz) + penalty * way;
-  }
-}
-
-// The same in sixteen boxes.
-OSTEO_WIDE
-void Curve::bounds(const Group& g, const float p[3], float arc, float penalty, float out[16]) {
-  for (int i = 0; i < 16; ++i) {
-    const float x = std::max(std::max(g.lo[0][i] - p[0], p[0] - g.hi[0][i]), 0.0F);
-    const float y = std::max(std::max(g.lo[1][i] - p[1], p[1] - g.hi[1][i]), 0.0F);
-    const float z = std::max(std::max(g.lo[2][i] - p[2], p[2] - g.hi[2][i]), 0.0F);
-    const float way = std::max(std::max(g.arc_lo[i] - arc, arc - g.arc_hi[i]), 0.0F);
-    out[i] = __builtin_sqrtf(x * x + y * y + z * z) + penalty * way;
-  }
+  return scalar;
 }
 
 CurvePoint Curve::on_segment(std::uint32_t segment, Vec3 p, double arc, double penalty) const {
@@ -183,7 +163,7 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
     if (e.bound > reach) continue;
     if (e.level == 0) {
       float bound[16];
-      leaf_bounds(leaves_[e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
+      loops_->leaf_bounds(leaves_[e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
       // The nearest first: it brings the reach down for the others.
       int first = 0;
       for (int i = 1; i < 16; ++i) first = bound[i] < bound[first] ? i : first;
@@ -201,7 +181,7 @@ CurvePoint Curve::minimum(Vec3 p, double arc, double penalty, std::uint32_t hint
       continue;
     }
     float bound[16];
-    bounds(levels_[static_cast<std::size_t>(e.level - 1)][e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
+    loops_->bounds(levels_[static_cast<std::size_t>(e.level - 1)][e.item], pf, static_cast<float>(arc), static_cast<float>(penalty), bound);
     const int begin = top;
     for (std::uint32_t i = 0; i < 16; ++i) {
       if (!(bound[i] <= reach)) continue;

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "osteo/base/error.h"
+#include "osteo/base/union_find.h"
 
 namespace osteo {
 namespace {
@@ -42,17 +43,13 @@ TriangleSoup sound_part(const TriMesh& mesh, std::uint64_t& bad_indices, std::ui
 std::vector<std::uint32_t> bodies_of(const TriangleSoup& soup, std::uint32_t& count) {
   std::vector<std::uint32_t> parent(soup.points_mm.size());
   std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
   for (const auto& t : soup.triangles) {
-    for (std::size_t e = 1; e < 3; ++e) parent[std::max(root(t[0]), root(t[e]))] = std::min(root(t[0]), root(t[e]));
+    for (std::size_t e = 1; e < 3; ++e) join_sets(parent, t[0], t[e]);
   }
   std::vector<std::uint32_t> number(parent.size(), 0xffffffffU), body;
   count = 0;
   for (const auto& t : soup.triangles) {
-    std::uint32_t& n = number[root(t[0])];
+    std::uint32_t& n = number[root_of(parent, t[0])];
     if (n == 0xffffffffU) n = count++;
     body.push_back(n);
   }
@@ -150,16 +147,12 @@ MeshSummary summarize(const TriMesh& mesh, const Context& context) {
             static_cast<std::int64_t>(welded.triangles.size());
   // Holes: connected sets of edges that one triangle has.
   std::map<std::uint32_t, std::uint32_t> parent;
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
   for (const auto& [key, n] : edges) {
     if (n != 1) continue;
     const auto u = static_cast<std::uint32_t>(key >> 32), v = static_cast<std::uint32_t>(key);
     parent.try_emplace(u, u);
     parent.try_emplace(v, v);
-    parent[root(u)] = root(v);
+    join_sets(parent, u, v);
   }
   for (const auto& [v, p] : parent) s.holes += v == p ? 1 : 0;
   std::uint32_t count = 0;

@@ -12,7 +12,10 @@
 
 #include "index_rows.h"
 #include "osteo/base/parallel.h"
+#include "osteo/base/portable_math.h"
+#include "osteo/base/union_find.h"
 #include "osteo/mesh/bone_surface.h"
+#include "osteo/mesh/soup.h"
 
 namespace osteo {
 namespace {
@@ -43,15 +46,7 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     const bool a = mask >> kEdges[e].from & 1, b = mask >> kEdges[e].to & 1;
     parent[e] = a != b ? e : std::uint8_t{12};
   }
-  const auto root = [&](std::uint8_t e) {
-    while (parent[e] != e) e = parent[e];
-    return e;
-  };
-  const auto join = [&](int a, int b) {
-    const std::uint8_t u = root(static_cast<std::uint8_t>(a)), v = root(static_cast<std::uint8_t>(b));
-    if (u < v) parent[v] = u;
-    if (v < u) parent[u] = v;
-  };
+  const auto join = [&](int a, int b) { join_sets(parent, static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b)); };
   for (unsigned f = 0; f < 6; ++f) {
     const auto& c = kFaces[f];
     std::array<int, 4> crossing{};
@@ -74,7 +69,7 @@ constexpr Sheets sheets_of(unsigned mask, unsigned flipped_faces) {
     }
   }
   Sheets result{};
-  for (std::uint8_t e = 0; e < 12; ++e) result[e] = parent[e] == 12 ? std::uint8_t{12} : root(e);
+  for (std::uint8_t e = 0; e < 12; ++e) result[e] = parent[e] == 12 ? std::uint8_t{12} : root_of(parent, e);
   return result;
 }
 
@@ -106,6 +101,9 @@ const Tables& tables() {
 
 // The voxels of a brick and 2 beyond it on each side.
 constexpr int kPad = 2, kBlock = BrickGrid::kEdge + 2 * kPad;
+// A crossing keeps this share of its edge away from both ends. Else a voxel of just the surface's density would draw the vertices of all cells
+// around it together; so, no two vertices are nearer than two thirds of this, and single precision keeps them apart.
+constexpr float kFromEnds = 0.01F;
 constexpr int kCells = BrickGrid::kEdge + 1;  // cells -1 .. 7 along each axis can hold vertices of this brick
 
 struct Block {
@@ -192,9 +190,10 @@ class PatchBuilder {
 
   // The area vector of the polygon in which a sheet cuts the faces of its cell. It needs no neighbours, so both sides of a
   // wall one voxel thin get their own; density gradients would cancel there.
-  static std::array<float, 3> sheet_normal(const CellSheets& cell, std::uint8_t sheet,
-                                           const std::array<std::array<float, 3>, 12>& crossing) {
-    std::array<float, 3> area{0, 0, 0};
+  // False where that has no area.
+  static bool sheet_normal(const CellSheets& cell, std::uint8_t sheet, const std::array<std::array<float, 3>, 12>& crossing,
+                           std::array<float, 3>& area) {
+    area = {0, 0, 0};
     for (unsigned f = 0; f < 6; ++f) {
       const auto& c = kFaces[f];
       std::array<std::size_t, 4> edge{};
@@ -222,9 +221,9 @@ class PatchBuilder {
       }
     }
     const float n = std::sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
-    if (!(n > 1e-12F)) return {0, 0, 1};
+    if (!(n > 1e-12F)) return false;
     for (float& x : area) x /= n;
-    return area;
+    return true;
   }
 
   static std::size_t cell_index(int i, int j, int k) { return static_cast<std::size_t>(((k + 1) * kCells + j + 1) * kCells + i + 1); }
@@ -243,12 +242,22 @@ class PatchBuilder {
       const float va = block_.at(i + (a & 1), j + (a >> 1 & 1), k + (a >> 2));
       const float vb = block_.at(i + (b & 1), j + (b >> 1 & 1), k + (b >> 2));
       crossing[e] = {static_cast<float>(a & 1), static_cast<float>(a >> 1 & 1), static_cast<float>(a >> 2)};
-      crossing[e][e / 4] += (iso_ - va) / (vb - va);
+      const float share = (iso_ - va) / (vb - va);  // edges begin at 0
+      crossing[e][e / 4] = share;
       for (std::size_t x = 0; x < 3; ++x) at[x] += crossing[e][x];
+      if (share < kFromEnds) at[e / 4] += kFromEnds - share;
+      if (share > 1 - kFromEnds) at[e / 4] -= share - (1 - kFromEnds);
       count += 1;
     }
     for (float& x : at) x /= count;
-    const std::array<float, 3> g = sheet_normal(cells_[cell_index(i, j, k)], sheet, crossing);
+    const CellSheets& of = cells_[cell_index(i, j, k)];
+    std::array<float, 3> g;
+    if (!sheet_normal(of, sheet, crossing, g)) {
+      for (std::size_t e = 0; e < 12; ++e) {
+        if (sheets[e] == sheet) crossing[e][e / 4] = std::clamp(crossing[e][e / 4], kFromEnds, 1 - kFromEnds);
+      }
+      if (!sheet_normal(of, sheet, crossing, g)) g = {0, 0, 1};
+    }
     const Ijk cell{base_.i + i, base_.j + j, base_.k + k};
     const auto part = [](int x) { return static_cast<std::uint64_t>(x + 1); };
     const std::uint64_t key = ((part(cell.k) << 20 | part(cell.j)) << 20 | part(cell.i)) << 4 | sheet;
@@ -386,6 +395,101 @@ BoneSurface surface_nets(const BrickGrid& bone, float iso, const Context& contex
   });
   context.progress(0.6, "joining patches");
   return join_patches(bone, patches);
+}
+
+namespace {
+
+// Volume and area of the surface at a density, in voxels; sums in the order of the bricks.
+struct Extent {
+  double volume = 0, area = 0;
+};
+Extent extent_at(const BrickGrid& bone, float iso, const Context& context) {
+  std::vector<Extent> of_brick(bone.brick_count());
+  parallel_for(of_brick.size(), 64, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    SurfacePatch patch;
+    for (std::size_t b = begin; b < end; ++b) {
+      extract_patch(bone, static_cast<std::uint32_t>(b), iso, patch);
+      const auto at = [&](std::uint32_t v) { return from_floats(patch.vertices[v].index); };
+      for (const auto& t : patch.triangles) {
+        const Vec3 p = at(t[0]), q = at(t[1]), r = at(t[2]);
+        of_brick[b].volume += dot(p, cross(q, r)) / 6;
+        of_brick[b].area += length(cross(q - p, r - p)) / 2;
+      }
+    }
+  });
+  Extent sum;
+  for (const Extent& e : of_brick) sum.volume += e.volume, sum.area += e.area;
+  return sum;
+}
+
+}  // namespace
+
+VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
+  constexpr double kEnough = 1e-4, kGood = 1e-3;  // of the volume
+  constexpr float kHalf = 0.5F, kLeast = 0.05F;
+  const double wanted = bone.sum(), voxel_mm3 = bone.frame().voxel_volume_mm3(), h = portable::cbrt(voxel_mm3);
+  float densest = 0;
+  for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+    const float* const v = bone.values_of_brick(b);
+    densest = std::max(densest, *std::max_element(v, v + BrickGrid::kVoxels));
+  }
+  VolumeSurface result;
+  result.bone_mm3 = wanted * voxel_mm3;
+  if (!(densest > 0)) return result;
+
+  // Volume falls as density rises: from one half by the surface's own area, then between the nearest from above and from below (the Illinois
+  // rule). Where it jumps, as at a new speck, the nearest that was met stands.
+  struct Point {
+    float iso;
+    double off;
+  };
+  const float low = std::min(kLeast, densest / 2), high = 1 - kLeast;
+  double best_off = 0, area_at_half = 0;
+  const auto look = [&](float iso) -> Point {
+    const Extent e = extent_at(bone, iso, context);
+    if (iso == kHalf) area_at_half = e.area;
+    const double off = e.volume - wanted;
+    if (iso == kHalf || std::abs(off) < std::abs(best_off)) best_off = off, result.iso = iso;
+    return {iso, off};
+  };
+  const Point half = look(kHalf);
+  const double step = 1.5 * half.off / std::max(area_at_half, 1e-9);
+  Point a = half, b = half;
+  for (float reach = static_cast<float>(std::copysign(std::clamp(std::abs(step), 1e-4, 0.5), step)); std::abs(half.off) > kEnough * wanted; reach *= 3) {
+    b = look(std::clamp(kHalf + reach, low, high));
+    if ((b.off > 0) != (half.off > 0) || b.iso == low || b.iso == high) break;
+    a = b;
+  }
+  for (int n = 0; n < 12 && (a.off > 0) != (b.off > 0) && std::abs(best_off) > kEnough * wanted; ++n) {
+    const Point c = look(static_cast<float>(a.iso + (b.iso - a.iso) * (a.off / (a.off - b.off))));
+    if ((c.off > 0) == (b.off > 0)) {
+      a.off /= 2;
+    } else {
+      a = b;
+    }
+    b = c;
+  }
+  result.mesh = surface_nets(bone, result.iso, context).mesh;
+
+  // Crumbs of a few voxels have more in them than any such surface encloses: the rest by size.
+  auto& points = result.mesh.points_mm;
+  result.surface_mm3 = enclosed_volume_mm3(result.mesh);
+  if (std::abs(result.surface_mm3 - result.bone_mm3) > kGood * result.bone_mm3 && result.surface_mm3 > 0) {
+    BoxMm box;
+    for (const auto& p : points) box.include(from_floats(p));
+    const Vec3 centre = (box.lo + box.hi) * 0.5;
+    const double scale = portable::cbrt(result.bone_mm3 / result.surface_mm3);
+    double farthest = 0;
+    for (const auto& p : points) farthest = std::max(farthest, length(from_floats(p) - centre));
+    if (std::abs(scale - 1) * farthest <= 0.5 * h) {
+      for (auto& p : points) p = to_floats(centre + (from_floats(p) - centre) * scale);
+      result.scale = scale;
+      result.surface_mm3 = enclosed_volume_mm3(result.mesh);
+    }
+  }
+  result.moved_mm = (result.surface_mm3 - (half.off + wanted) * voxel_mm3) / area_mm2(result.mesh);
+  return result;
 }
 
 }  // namespace osteo

@@ -77,7 +77,7 @@ Deviation deviation_from_marching_cubes(const BrickGrid& bone, const BoneSurface
 StageInfo SurfaceStage::info() {
   return {
       .name = "surface",
-      .version = 1,
+      .version = 2,
       .synopsis = "triangle surface of a bone density grid",
       .description =
           "nets: one vertex for each sheet of surface between eight voxels; closed, oriented and manifold for any bone. "

@@ -1,8 +1,8 @@
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "osteo/base/error.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/scene/rehearsal.h"
 
 namespace osteo {
@@ -28,8 +28,8 @@ Script make_default_script(const World& world, bool left, int tool, double secon
   const double longest = length({f.dims[0] * f.spacing_mm.x, f.dims[1] * f.spacing_mm.y, f.dims[2] * f.spacing_mm.z});
   for (int ring = 0; ring < 40 && !entry; ++ring) {
     for (int a = 0; a < (ring == 0 ? 1 : 8) && !entry; ++a) {
-      const double angle = a * std::numbers::pi / 4;
-      const Vec3 from = centre + Vec3{0, 2.0 * ring * std::cos(angle), 2.0 * ring * std::sin(angle)};
+      const portable::SinCos turn = portable::sin_cos_turns(a / 8.0);
+      const Vec3 from = centre + Vec3{0, 2.0 * ring * turn.cos, 2.0 * ring * turn.sin};
       double bone_end = -1;
       for (double s = 0; s < longest; s += 0.25) {
         if (world.nearest(from + out * s) >= 0.5F) {
@@ -57,10 +57,11 @@ Script make_default_script(const World& world, bool left, int tool, double secon
     const double share = (t - first) / (last - first);
     // Turns that open and close between the middle and the rim, a little deeper each time.
     const double rim = std::min(7.0, 3 + seconds / 15), sway = std::abs(std::fmod(0.25 * (t - first), 2.0) - 1);
-    const double circle = rim * (1 - sway), angle = 2 * std::numbers::pi * 1.2 * (t - first);
+    const double circle = rim * (1 - sway);
+    const portable::SinCos turn = portable::sin_cos_turns(1.2 * (t - first));
     const double depth = 3 + std::min(9.0, 0.12 * seconds + 1) * share;
     script.waypoints.push_back(
-        {t, *entry + out * (radius - depth) + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+        {t, *entry + out * (radius - depth) + u * (circle * turn.cos) + v * (circle * turn.sin), true});
   }
   script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});
   script.waypoints.push_back({seconds, *entry + out * (radius + 8), false});

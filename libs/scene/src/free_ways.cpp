@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "osteo/base/portable_math.h"
 #include "osteo/bone/burr.h"
 #include "osteo/haptics/haptic_scene.h"
 
@@ -22,11 +23,11 @@ constexpr double kLookMm = 0.5;    // between two looks along a way
 
 // Rings around a round cone, `spacing_mm` apart.
 void add_skin(const RoundCone& c, double spacing_mm, ToolSkin& skin) {
-  const double sine = c.slope(), cosine = std::sqrt(1 - sine * sine), tangent = std::asin(sine);
+  const double sine = c.slope(), cosine = std::sqrt(1 - sine * sine), tangent = portable::asin(sine);
   const auto ring = [&](double radius, double z, double out_radial, double out_z) {
     const int n = std::max(1, static_cast<int>(std::ceil(2 * kPi * radius / spacing_mm)));
     for (int i = 0; i < n; ++i) {
-      const double a = 2 * kPi * i / n, x = std::cos(a), y = std::sin(a);
+      const auto [y, x] = portable::sin_cos_turns(static_cast<double>(i) / n);
       skin.points.push_back({{radius * x, radius * y, z}, {out_radial * x, out_radial * y, out_z}});
       skin.reach_mm = std::max(skin.reach_mm, length(skin.points.back().at_mm));
     }
@@ -34,7 +35,7 @@ void add_skin(const RoundCone& c, double spacing_mm, ToolSkin& skin) {
   const auto cap = [&](double middle, double radius, double from, double to) {
     const int n = std::max(1, static_cast<int>(std::ceil(radius * (to - from) / spacing_mm)));
     for (int i = 0; i <= n; ++i) {
-      const double latitude = from + (to - from) * i / n, u = std::cos(latitude), w = std::sin(latitude);
+      const auto [w, u] = portable::sin_cos(from + (to - from) * i / n);
       ring(radius * u, middle + radius * w, u, w);
     }
   };
@@ -48,7 +49,7 @@ void add_skin(const RoundCone& c, double spacing_mm, ToolSkin& skin) {
 }
 
 double angle_between(Vec3 a, Vec3 b) {
-  return std::atan2(length(cross(a, b)), dot(a, b));
+  return portable::atan2(length(cross(a, b)), dot(a, b));
 }
 
 // On the great circle from a to b (units).
@@ -57,7 +58,8 @@ Vec3 between(Vec3 a, Vec3 b, double share) {
   if (angle < 1e-9) return a;
   Vec3 side = b - a * dot(a, b);
   side = length(side) < 1e-6 ? any_perpendicular(a) : normalized(side);
-  return normalized(a * std::cos(angle * share) + side * std::sin(angle * share));
+  const auto [sine, cosine] = portable::sin_cos(angle * share);
+  return normalized(a * cosine + side * sine);
 }
 
 // As the hand turns on a leg (GuidedHand).
@@ -70,8 +72,9 @@ std::vector<Vec3> directions(Vec3 axis, Vec3 rather) {
   constexpr int kCount = 160;
   std::vector<Vec3> all;
   for (int i = 0; i < kCount; ++i) {
-    const double z = 1 - (2 * i + 1.0) / kCount, r = std::sqrt(1 - z * z), a = i * kPi * (3 - std::sqrt(5.0));
-    all.push_back({r * std::cos(a), r * std::sin(a), z});
+    const double z = 1 - (2 * i + 1.0) / kCount, r = std::sqrt(1 - z * z);
+    const auto [sine, cosine] = portable::sin_cos(i * kPi * (3 - std::sqrt(5.0)));
+    all.push_back({r * cosine, r * sine, z});
   }
   const Vec3 best = axis + rather;
   std::stable_sort(all.begin(), all.end(), [&](Vec3 a, Vec3 b) { return dot(a, best) > dot(b, best); });

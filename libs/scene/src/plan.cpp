@@ -10,6 +10,7 @@
 #include "osteo/bone/plate_fit.h"
 #include "osteo/bone/world_mesh.h"
 #include "osteo/io/surface_io.h"
+#include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {
@@ -73,19 +74,30 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
   j["osteotome_plan"] = 1;
   j["units"] = "mm, LPS; transforms take points of the case to where they are now";
   j["pieces"] = ordered_json::array();
+  constexpr double kWarnPercent = 0.1;
   const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
   double done = 0;
   for (const PlacedBody& b : world.bodies()) {
     context.progress(done++ / steps, "pieces");
     const std::string name = "piece-" + std::to_string(b.body->id) + ".stl";
-    save_surface(surface_of(b, context), folder / name);
+    const VolumeSurface surface = surface_of_volume(b.body->bone, context);
+    save_surface(moved(surface.mesh, b.world_from_body), folder / name);
+    const double off_percent = surface.bone_mm3 > 0 ? 100 * (surface.surface_mm3 / surface.bone_mm3 - 1) : 0;
+    if (std::abs(off_percent) > kWarnPercent)
+      context.warn("piece " + std::to_string(b.body->id) + ": its surface holds " + format_number(surface.surface_mm3) + " mm3, the bone " +
+                   format_number(surface.bone_mm3) + ": too few voxels for a surface of that volume");
     const LiveComponents solid(b.body->bone);
     const double voxel = b.body->bone.frame().voxel_volume_mm3();
     const auto& parts = solid.components();
     const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& x, const auto& y) { return x.mass < y.mass; });
     ordered_json piece{{"number", b.body->id},
                        {"file", name},
-                       {"volume_mm3", b.body->bone.sum() * voxel},
+                       {"volume_mm3", surface.bone_mm3},
+                       {"surface_volume_mm3", surface.surface_mm3},
+                       {"surface_volume_off_percent", off_percent},
+                       {"surface_at_density", static_cast<double>(surface.iso)},
+                       {"surface_scaled_by", surface.scale},
+                       {"surface_moved_mm", surface.moved_mm},
                        {"region_of_interest", b.of_region},
                        {"transform", matrix(b.world_from_body)},
                        {"shift_mm", triple(b.world_from_body.shift_mm)}};

@@ -10,6 +10,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/bone/burr.h"
 #include "osteo/bone/plates.h"
 
@@ -306,11 +307,12 @@ class ScriptReader {
     constexpr double kStep = 0.05, kSwaysPerS = 0.25;
     for (double t = 0; t < c.over_s; t += kStep) {
       const double share = t / c.over_s, sway = std::abs(std::fmod(kSwaysPerS * t, 2.0) - 1);
-      const double circle = c.radius_mm * (1 - sway), angle = 2 * std::numbers::pi * c.turns_per_s * t;
+      const double circle = c.radius_mm * (1 - sway);
+      const portable::SinCos turn = portable::sin_cos_turns(c.turns_per_s * t);
       // A bowl: less deep towards its rim.
       const double depth = c.depth_mm * share * (1 - 0.4 * (circle / c.radius_mm) * (circle / c.radius_mm));
       script_.waypoints.push_back(
-          {begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * std::cos(angle)) + v * (circle * std::sin(angle)), true});
+          {begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
     }
   }
 

@@ -36,6 +36,19 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
     f.polygonlist[0].vertexlist = new int[3];
     for (std::size_t k = 0; k < 3; ++k) f.polygonlist[0].vertexlist[k] = static_cast<int>(used.soup.triangles[i][k]);
   }
+  context.progress(0.1, "looking for triangles that cross");
+  try {
+    // First, since TetGen 1.5.0 ends the program when it meets them while meshing.
+    tetgenio crossing;
+    char detect[] = "dQ";
+    tetrahedralize(detect, &in, &crossing);
+    if (crossing.numberoftrifaces > 0)
+      throw Error(ExitCode::failed,
+                  "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) + " triangles of this one do",
+                  advice);
+  } catch (const int code) {
+    throw Error(ExitCode::failed, "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")", advice);
+  }
   std::string switches = "pQq" + format_number(options.radius_edge_ratio);
   if (options.min_dihedral_deg > 0) switches += "/" + format_number(options.min_dihedral_deg);
   if (options.max_volume_mm3 > 0) switches += "a" + format_number(options.max_volume_mm3);

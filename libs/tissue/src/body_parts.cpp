@@ -48,11 +48,6 @@ void require_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n, std:
   }
 }
 
-std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points) {
   std::vector<std::uint32_t> inside;
   Vec3 out;

@@ -19,8 +19,6 @@ std::vector<std::array<std::uint32_t, 3>> boundary_triangles(const TissueModel& 
 std::vector<std::uint32_t> points_of(std::span<const std::array<std::uint32_t, 3>> triangles);
 /// Error(usage) for a load that is not finite or on no point.
 void require_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n, std::size_t points);
-/// Of a forest where each points to one nearer its root; halves the way there.
-std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t i);
 /// Those of the points that lie inside the shape at rest.
 std::vector<std::uint32_t> points_inside(const RigidShape& shape, std::span<const Vec3> rest, std::span<const std::uint32_t> points);
 

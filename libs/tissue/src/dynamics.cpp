@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
-#include <string_view>
 #include <type_traits>
 
 #include "body_parts.h"
 #include "dynamics_impl.h"
 #include "osteo/base/error.h"
+#include "osteo/base/simd.h"
+#include "osteo/base/union_find.h"
 
 namespace osteo {
 
@@ -17,39 +17,25 @@ using namespace tissue;
 
 namespace {
 
-enum class Isa { base, avx2, avx512 };
-Isa chosen() {
-  static const Isa isa = [] {
-#if defined(__x86_64__)
-    const char* const wish = std::getenv("OSTEO_SIMD");
-    const std::string_view most = wish != nullptr ? wish : "avx512";
-    if (most == "avx512" && __builtin_cpu_supports("avx512f")) return Isa::avx512;
-    if (most != "scalar" && __builtin_cpu_supports("avx2")) return Isa::avx2;
-#endif
-    return Isa::base;
-  }();
-  return isa;
-}
-
 template <class Real>
 tissue::ForceFunction<Real> force_function() {
   if constexpr (std::is_same_v<Real, float>) {
-    switch (chosen()) {
+    switch (simd()) {
 #if defined(__x86_64__)
-      case Isa::avx512:
+      case Simd::avx512:
         return tissue::avx512::forces_float;
-      case Isa::avx2:
+      case Simd::avx2:
         return tissue::avx2::forces_float;
 #endif
       default:
         return tissue::base::forces_float;
     }
   } else {
-    switch (chosen()) {
+    switch (simd()) {
 #if defined(__x86_64__)
-      case Isa::avx512:
+      case Simd::avx512:
         return tissue::avx512::forces_double;
-      case Isa::avx2:
+      case Simd::avx2:
         return tissue::avx2::forces_double;
 #endif
       default:
@@ -63,10 +49,6 @@ constexpr double kStretchMargin = 1.25;
 constexpr std::uint64_t kObstacleSteps = 10, kTieSteps = 200, kCertifySteps = 100;
 
 }  // namespace
-
-const char* tissue_simd_name() {
-  return chosen() == Isa::avx512 ? "avx512" : chosen() == Isa::avx2 ? "avx2" : "base";
-}
 
 template <class Real>
 void TissueDynamics<Real>::Impl::lay_out() {
@@ -252,7 +234,7 @@ std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
   const auto there = [&](std::uint32_t t) { return !m.cutter || m.cutter->there(t); };
   for (std::uint32_t t = 0; t < m.model.tets().size(); ++t) {
     if (!there(t)) continue;
-    for (const std::uint32_t p : m.model.tets()[t]) parent[root(p)] = root(m.model.tets()[t][0]);
+    for (const std::uint32_t p : m.model.tets()[t]) join_sets(parent, p, m.model.tets()[t][0]);
   }
   std::vector<bool> held(m.x.size());
   for (std::uint32_t p = 0; p < m.x.size(); ++p) {

@@ -13,6 +13,7 @@
 #include "body_parts.h"
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
+#include "osteo/base/union_find.h"
 
 #ifdef OSTEO_WITH_CHOLMOD
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));  // where BLAS is that one
@@ -260,8 +261,7 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
       if (p >= points)
         throw Error(ExitCode::usage, "element " + std::to_string(e) + " names point " + std::to_string(p) + ", which is not there");
       used[p] = true;
-      const std::uint32_t a = root_of(parent, nodes[0]), b = root_of(parent, p);
-      if (a != b) parent[std::max(a, b)] = std::min(a, b);
+      join_sets(parent, nodes[0], p);
     }
     if (nodes.size() == 1) anchored[nodes[0]] = true;
   }

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include "osteo/base/context.h"
@@ -51,9 +50,5 @@ class TriangleTree {
 
 /// The point of one triangle nearest to p, by the same arithmetic.
 [[nodiscard]] ClosestPoint closest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c);
-
-/// The instruction set in use: "avx512", "avx2" or "scalar". The environment's OSTEO_SIMD may name a lesser one; results are
-/// the same.
-[[nodiscard]] std::string_view simd_name();
 
 }  // namespace osteo

@@ -50,7 +50,4 @@ class Overlap {
   std::unique_ptr<PartialBuffer> partial_;
 };
 
-/// Which instruction set measure() uses: "avx512", "avx2" or "base"; all give the same bits. OSTEO_SIMD=scalar asks for the last.
-[[nodiscard]] const char* overlap_simd_name();
-
 }  // namespace osteo

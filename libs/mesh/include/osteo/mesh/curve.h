@@ -43,18 +43,18 @@ class Curve {
   struct Group {  // sixteen boxes with their stretches of arc
     float lo[3][16], hi[3][16], arc_lo[16], arc_hi[16];
   };
+  struct Loops;
   struct Leaf {  // sixteen segments: start, unit direction, length and arc, about the curve's centre
     float at[3][16], direction[3][16], length[16], arc[16];
   };
   [[nodiscard]] CurvePoint minimum(Vec3 p, double arc_mm, double penalty, std::uint32_t hint) const;
   [[nodiscard]] CurvePoint on_segment(std::uint32_t segment, Vec3 p, double arc_mm, double penalty) const;
-  static void bounds(const Group& group, const float p[3], float arc, float penalty, float out[16]);
-  static void leaf_bounds(const Leaf& leaf, const float p[3], float arc, float penalty, float out[16]);
 
   std::vector<Vec3> points_;
   std::vector<double> arcs_;
   std::vector<std::vector<Group>> levels_;  // level 0: a box is 16 segments
   std::vector<Leaf> leaves_;
+  const Loops* loops_ = nullptr;
   Vec3 centre_;
   double rounding_ = 0, arc_rounding_ = 0;  // of single-precision bounds, mm
 };

@@ -71,7 +71,4 @@ class TissueDynamics {
   std::unique_ptr<Impl> impl_;
 };
 
-/// "avx512", "avx2" or "base"; OSTEO_SIMD=scalar asks for the last.
-[[nodiscard]] const char* tissue_simd_name();
-
 }  // namespace osteo

@@ -1,0 +1,4 @@
+#if defined(__x86_64__)
+#define OSTEO_ISA avx2
+#include "curve_loops.h"
+#endif

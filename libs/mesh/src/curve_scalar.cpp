@@ -1,0 +1,2 @@
+#define OSTEO_ISA scalar
+#include "curve_loops.h"
