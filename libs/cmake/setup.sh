@@ -4,6 +4,48 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 
 say() { printf '%s\n' "$*" >&2; }
 
+# show_progress TITLE PERCENT TEXT: on a terminal one line that is written over, elsewhere a line each 10 %.
+shown_tenth=-1
+show_progress() {
+  if [ -t 2 ]; then
+    printf '\r%s: %s %%  %.60s\033[K' "$1" "$2" "$3" >&2
+  elif [ $(($2 / 10)) -gt "$shown_tenth" ]; then
+    shown_tenth=$(($2 / 10))
+    say "$1: $2 %  $3"
+  fi
+}
+end_progress() {
+  [ ! -t 2 ] || printf '\r\033[K' >&2
+  shown_tenth=-1
+}
+
+# Reads what ninja prints, keeps it in LOG and shows how far it is. show_build TITLE LOG
+show_build() {
+  local line begun=
+  while IFS= read -r line || [ -n "$line" ]; do
+    printf '%s\n' "$line" >>"$2"
+    [[ $line =~ ^\[([0-9]+)/([0-9]+)\]\ (.*) ]] || continue
+    [ "${BASH_REMATCH[2]}" -gt 2 ] || continue # looking whether there is anything to do is not building
+    [ -n "$begun" ] || { begun=1; say "$1: ${BASH_REMATCH[2]} steps"; }
+    show_progress "$1" $((BASH_REMATCH[1] * 100 / BASH_REMATCH[2])) "[${BASH_REMATCH[1]}/${BASH_REMATCH[2]}] ${BASH_REMATCH[3]##*/}"
+  done
+  [ -z "$begun" ] || end_progress
+}
+
+# Reads apt's status lines ("dlstatus:1:12.5:text", "pmstatus:package:40:text"): fetching is the first half, installing the second. show_apt TITLE
+show_apt() {
+  local kind name percent text
+  while IFS=: read -r kind name percent text; do
+    percent=${percent%%.*}
+    [[ $percent =~ ^[0-9]+$ ]] || continue
+    case $kind in
+      dlstatus) show_progress "$1" $((percent / 2)) "$text" ;;
+      pmstatus) show_progress "$1" $((50 + percent / 2)) "$text" ;;
+    esac
+  done
+  end_progress
+}
+
 # Installs the Debian packages that are missing; asks nothing. Does nothing, quickly, when all are there.
 ensure_packages() {
   local list=$root/libs/cmake/packages.txt stamp=$root/build/.packages missing=() package
@@ -21,9 +63,16 @@ ensure_packages() {
       command -v sudo >/dev/null || { say "These packages are missing, and there is neither root nor sudo to install them: ${missing[*]}"; exit 9; }
       sudo=sudo
     fi
-    say "Installing ${#missing[@]} Debian packages (2 to 4 minutes): ${missing[*]}"
-    $sudo apt-get update -qq >&2 || say "apt-get update failed; trying with what is known"
-    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2 || { say "The packages could not be installed. Is there a network?"; exit 9; }
+    mkdir -p "$root/build"
+    local log=$root/build/packages.log
+    say "Installing ${#missing[@]} Debian packages (2 to 4 minutes); what apt says goes to $log"
+    $sudo apt-get update -qq >"$log" 2>&1 || say "apt-get update failed; trying with what is known"
+    $sudo env LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends -o APT::Status-Fd=1 "${missing[@]}" </dev/null 2>&1 |
+      tee -a "$log" | show_apt "Installing packages" || {
+      tail -n 15 "$log" >&2
+      say "The packages could not be installed (${missing[*]}). Is there a network? All of it is in $log"
+      exit 9
+    }
   fi
   mkdir -p "$root/build" && touch "$stamp"
 }
@@ -42,19 +91,24 @@ ensure_readers() {
 
 # ensure_built PRESET TARGET...: builds when a source is newer than the last build.
 ensure_built() {
-  local preset=$1 dir=$root/build/$1 newer
+  local preset=$1 dir=$root/build/$1 newer title="Building" head
   shift
+  head=$(git -C "$root" rev-parse HEAD 2>/dev/null || true)
   if [ -e "$dir/.built-$1" ]; then
     newer=$(find "$root/libs" "$root/apps" "$root/pipelines" "$root/tests" "$root/CMakeLists.txt" "$root/CMakePresets.json" -newer "$dir/.built-$1" -print -quit)
-    [ -z "$newer" ] && return
+    # A commit changes nothing but the version that the program tells; that counts too.
+    [ -z "$newer" ] && [ "$(cat "$dir/.built-$1")" = "$head" ] && return
+    title="Building what changed"
   else
-    say "Building (the first time takes some minutes) ..."
+    say "Setting up the build (the first time takes some minutes in all) ..."
   fi
   local began
   began=$(mktemp)
   (cd "$root" && cmake --preset "$preset" >"$dir.configure.log" 2>&1) || { cat "$dir.configure.log" >&2; say "The build could not be set up."; rm -f "$began"; exit 1; }
-  cmake --build "$dir" --target "$@" >"$dir.build.log" 2>&1 || { grep -E 'error|FAILED|undefined' "$dir.build.log" | head -n 40 >&2; say "The build failed; all of it is in $dir.build.log"; rm -f "$began"; exit 1; }
+  : >"$dir.build.log"
+  (export NINJA_STATUS='[%f/%t] '; cmake --build "$dir" --target "$@" 2>&1) | show_build "$title" "$dir.build.log" || { grep -E 'error|FAILED|undefined' "$dir.build.log" | head -n 40 >&2; say "The build failed; all of it is in $dir.build.log"; rm -f "$began"; exit 1; }
   # The time before the build: what was changed meanwhile is built next time.
+  printf '%s\n' "$head" >"$dir/.built-$1"
   touch -r "$began" "$dir/.built-$1"
   rm -f "$began"
 }

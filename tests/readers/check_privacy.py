@@ -69,7 +69,7 @@ files[10].write_bytes(files[10].read_bytes()[:3000])
 osteo("import", source, "damaged.nrrd")
 for f in files[20:26]:
     f.unlink()
-osteo("import", source, "refused.nrrd", code=7)
+osteo("import", source, "refused.nrrd", code=4)
 osteo("import", "--list", source)
 
 found = []

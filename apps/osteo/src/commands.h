@@ -132,6 +132,7 @@ struct PrepareCommand {
     std::string series;
     std::string axes;
     std::string pipeline;
+    bool fresh = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the case, made when it is not there (also -o)"}, p.out);
@@ -145,6 +146,7 @@ struct PrepareCommand {
     visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
+    visit({"fresh", "forget the flags that the case remembers: only those given now count"}, p.fresh);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -9,6 +9,7 @@
 #include "osteo/base/files.h"
 #include "osteo/dicom/objects.h"
 #include "osteo/pipeline/formats.h"
+#include "osteo/pipeline/pipeline.h"
 
 namespace osteo {
 
@@ -26,7 +27,7 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path from = io.arguments[0], to = io.arguments[1];
   static constexpr std::array kAny{DataKind::labels, DataKind::image, DataKind::grid, DataKind::surface, DataKind::tets, DataKind::picture};
   require_readable(from);
-  if (fs::exists(to) && !io.common.force) {
+  if (output_exists(to) && !io.common.force) {
     throw Error(ExitCode::cannot_write, "'" + to.string() + "' exists already", "give another name, or --force to replace it");
   }
   Data data = load_data(from, kAny, io.context);
@@ -37,7 +38,7 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
   require_savable(kind_of(data), to);
   if (p.source.empty()) {
     if (p.onto_source) throw Error(ExitCode::usage, "--onto-source needs --source DICOM_FOLDER");
-    save_data(data, to, io.context);
+    save_data(data, to, io.context, [&](const fs::path& old) { require_replaceable(old, to); });
   } else {
     if (to.extension() != ".dcm") throw Error(ExitCode::usage, "--source is for outputs that end in .dcm");
     const DicomScan scan = scan_dicom(p.source, {}, io.context);

@@ -6,6 +6,7 @@
 #include "osteo/base/files.h"
 #include "osteo/dicom/save_series.h"
 #include "osteo/image/phantom.h"
+#include "osteo/scene/case.h"
 
 namespace osteo {
 
@@ -20,7 +21,7 @@ cli::CommandInfo DemoCommand::info() {
 
 int DemoCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path out = p.out;
-  fs::create_directories(out);
+  make_output_folder(out);
   const bool phantom = io.arguments.empty();
   fs::path source = phantom ? out / "phantom-dicom" : fs::path(io.arguments[0]);
   const auto say = [&](const std::string& text) {
@@ -31,14 +32,24 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
     say("making a CT of a phantom head: " + source.string());
     PhantomParams params;
     save_dicom_series(make_phantom(params, io.context).ct, source, io.context);
+    io.end_progress();
   }
   say("preparing the case: " + (out / "case").string());
   PrepareCommand::Params prepare;
   prepare.out = (out / "case").string();
   prepare.axes = p.axes;
   if (phantom) prepare.lower = 500;  // half-way between the phantom's bone and tissue
+  prepare.fresh = true;
+  io.given = {"lower", "axes", "fresh"};
+  if (!phantom) io.given.erase("lower");
+  io.settings.clear();
   io.arguments = {source.string()};
+  // Only what an earlier demo left on another scan is made anew.
+  const auto earlier = read_recipe(prepare.out);
+  const bool force = io.common.force;
+  io.common.force = force || (earlier && earlier->source_hash != hash_path(source));
   PrepareCommand::run(prepare, io);
+  io.common.force = force;
 
   say("drilling for " + format_number(p.seconds) + " s");
   const fs::path session = out / "session";

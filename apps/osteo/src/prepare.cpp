@@ -11,57 +11,204 @@
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {
+namespace {
+
+// A file that the case was made from: as named now, or where it was seen last.
+struct Input {
+  fs::path path;
+  std::string hash;
+};
+
+Input input_of(const std::string& named) {
+  require_readable(named);
+  return {named, hash_path(named)};
+}
+
+std::string quoted(const std::string& text) {
+  return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
+}
+
+// As it is written on a command line: --lower 500, --set keep_largest=1, --remove-table.
+std::string flag_of(const std::string& name, const std::string& value, const std::vector<FieldRef>& fields) {
+  for (const FieldRef& f : fields) {
+    if (f.doc.name != name) continue;
+    if (f.kind() != "flag") return f.flag() + " " + quoted(value);
+    return value == "true" ? f.flag() : "--no-" + f.flag().substr(2);
+  }
+  return "--set " + name + "=" + quoted(value);
+}
+
+// What is asked for now, by variable; none where a setting is dropped.
+std::map<std::string, std::optional<std::string>> given_now(const std::vector<FieldRef>& fields, const cli::Invocation& io) {
+  std::map<std::string, std::optional<std::string>> given;
+  const auto own = [](const std::string& name) { return name == "out" || name == "pipeline" || name == "structures" || name == "fresh"; };
+  for (const FieldRef& f : fields) {
+    const std::string name(f.doc.name), value = f.to_text();
+    if (!io.given.contains(name) || own(name)) continue;
+    given[name] = f.kind() == "text" && value.empty() ? std::nullopt : std::optional(value);
+  }
+  for (const auto& [name, value] : io.settings) {
+    if (own(name) || name == "source" || name == "case")
+      throw Error(ExitCode::usage, "--set " + name + ": that is not a setting of the pipeline here", "'osteo help prepare' shows how it is given");
+    given[name] = value.empty() ? std::nullopt : std::optional(value);
+  }
+  if (const auto it = given.find("preset"); it != given.end() && it->second && *it->second != "fixed" && given.contains("lower") && given["lower"])
+    throw Error(ExitCode::usage, "--lower does nothing with --preset " + *it->second + ", which finds the threshold itself", "give one of them");
+  return given;
+}
+
+}  // namespace
 
 cli::CommandInfo PrepareCommand::info() {
   return {
       "prepare",
       "a CT becomes a case that can be rehearsed",
       "Runs the pipeline temporal-bone.json: import, crop, threshold, resample, surface, preview; writes a manifest. Run again, it keeps "
-      "what is unchanged. "
-      "Variables of the pipeline are also set with --set NAME=VALUE.",
-      {{"source", "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti)"}},
+      "what is unchanged, and the case remembers the flags that made it: only what is given again changes, and it says what from and to. "
+      "--fresh forgets them all, --no-structures (or another of the text flags) or an empty --set NAME= drops one. Until the new state is "
+      "whole the case stays as it was. Variables of the pipeline are also set with --set NAME=VALUE.",
+      {{"source", "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti); may be left out when the case was made on this "
+                  "machine",
+        true}},
       "osteo prepare DICOM_FOLDER -o CASE"};
 }
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {
-  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo prepare " + io.arguments[0] + " -o CASE");
-  require_readable(io.arguments[0]);
+  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo prepare " + (io.arguments.empty() ? "SCAN" : io.arguments[0]) + " -o CASE");
   const fs::path folder = p.out;
-  if (fs::exists(folder) && !fs::is_directory(folder))
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is a file, not a folder");
-  const bool is_new = !fs::exists(folder);
-  if (!is_new && !fs::is_empty(folder) && !fs::exists(folder / "manifest.json") && !fs::exists(folder / "bone.vdb.prov.json") &&
-      !fs::exists(folder / "import.json") && !io.common.force) {
-    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case",
-                "give another name, or --force to write into it");
+  Params given_params = p;
+  const auto fields = fields_of<PrepareCommand>(given_params);
+  const auto given = given_now(fields, io);
+  std::vector<std::string> notes;
+  if (!io.arguments.empty()) require_readable(io.arguments[0]);
+  CaseUpdate update(folder);
+
+  const auto all_of = [&](const Recipe& r) {
+    std::string all = r.structures_hash.empty() ? "" : " --structures";
+    for (const auto& [name, value] : r.settings) all += " " + flag_of(name, value, fields);
+    return all.empty() ? " nothing" : all;
+  };
+
+  // What the case remembers, and whether it is the same scan.
+  std::optional<Recipe> before = read_recipe(folder);
+  const bool is_case = output_exists(folder / "manifest.json");
+  if (is_case && !before && !p.fresh && foreign_files(folder, {}).empty()) {
+    throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version and remembers no flags",
+                "give all its flags again, with --fresh");
   }
-  const std::string text = p.pipeline.empty() ? std::string(kTemporalBonePipeline) : read_text(p.pipeline);
-  std::map<std::string, std::string> settings{{"source", io.arguments[0]}, {"case", folder.string()}};
-  // Each flag is a variable of the pipeline; one that another pipeline does not have may only be left alone.
-  Params defaults, given = p;
-  const auto known = pipeline_variables(text);
-  const auto plain = fields_of<PrepareCommand>(defaults), set = fields_of<PrepareCommand>(given);
-  for (std::size_t f = 0; f < set.size(); ++f) {
-    const std::string name(set[f].doc.name), value = set[f].to_text();
-    if (name == "out" || name == "pipeline" || name == "structures" || name == "names") continue;
-    if (std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name; })) {
-      settings[name] = value;
-    } else if (value != plain[f].to_text()) {
-      throw Error(ExitCode::usage,
-                  "the pipeline '" + p.pipeline + "' has no variable '" + name + "', so " + set[f].flag() + " does nothing");
+  Input source;
+  if (!io.arguments.empty()) {
+    source = input_of(io.arguments[0]);
+    if (before && before->source_hash != source.hash) {
+      if (!io.common.force) {
+        throw Error(ExitCode::cannot_write, "'" + folder.string() + "' was made from another scan than '" + io.arguments[0] + "', or the scan was changed",
+                    "give another name, or --force to make the case anew from this scan, without the flags it remembers");
+      }
+      notes.push_back("another scan: forgotten is" + all_of(*before));
+      before.reset();
+    }
+  } else {
+    if (!before) throw Error(ExitCode::usage, "of which scan? osteo prepare SCAN -o " + p.out);
+    const auto path = recall_file(before->source_hash);
+    if (!path) {
+      throw Error(ExitCode::no_input, "the scan of '" + folder.string() + "' is not known here, or was moved or changed: a case does not hold its name",
+                  "give it: osteo prepare SCAN -o " + p.out);
+    }
+    source = {*path, before->source_hash};
+  }
+  if (before && p.fresh) {
+    notes.push_back("--fresh: forgotten is" + all_of(*before));
+    before.reset();
+  }
+  Recipe recipe = before.value_or(Recipe{});
+  recipe.source_hash = source.hash;
+
+  // The pipeline, and the label map of structures.
+  std::string text(kTemporalBonePipeline);
+  if (io.given.contains("pipeline") && p.pipeline.empty()) recipe.pipeline_hash.clear();
+  if (!p.pipeline.empty()) {
+    text = read_text(p.pipeline);
+    recipe.pipeline_hash = hash_path(p.pipeline);
+    remember(recipe.pipeline_hash, fs::absolute(p.pipeline).string());
+  } else if (!recipe.pipeline_hash.empty()) {
+    const auto path = recall_file(recipe.pipeline_hash);
+    if (!path) {
+      throw Error(ExitCode::no_input, "the pipeline file that '" + folder.string() + "' was made with is not known here, or was moved or changed",
+                  "give it again with --pipeline, or --no-pipeline for the built-in one");
+    }
+    text = read_text(*path);
+  }
+  Input structures;
+  bool as_the_case_holds_them = false;
+  if (io.given.contains("structures")) {
+    if (!p.structures.empty()) structures = input_of(p.structures);
+  } else if (!recipe.structures_hash.empty()) {
+    structures.hash = recipe.structures_hash;
+    if (const auto path = recall_file(structures.hash)) {
+      structures.path = *path;
+    } else if (!given.contains("names") && fs::exists(folder / "structures.seg.nrrd")) {
+      structures.path = folder / "structures.seg.nrrd";
+      as_the_case_holds_them = true;
+    } else {
+      throw Error(ExitCode::no_input, "the label map of the structures of '" + folder.string() + "' is not known here, or was moved or changed",
+                  "give it again with --structures, or --no-structures to drop them");
     }
   }
-  for (const auto& [key, value] : io.settings) settings[key] = value;
+  const bool other_structures = before && structures.hash != before->structures_hash;
+  if (other_structures) {
+    notes.push_back(structures.hash.empty()            ? "--structures: dropped"
+                    : before->structures_hash.empty() ? "--structures: new"
+                                                      : "--structures: another label map");
+  }
+  recipe.structures_hash = structures.hash;
+
+  // The settings. One that another pipeline does not have may only be left alone.
+  const auto known = pipeline_variables(text);
+  const auto is_known = [&](const std::string& name) {
+    return name == "names" || std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name; });
+  };
+  for (const FieldRef& f : fields) {
+    const std::string name(f.doc.name);
+    if (given.contains(name) && given.at(name) && !is_known(name)) {
+      throw Error(ExitCode::usage, "the pipeline '" + p.pipeline + "' has no variable '" + name + "', so " + f.flag() + " does nothing");
+    }
+  }
+  auto wanted = given;
+  if (before && recipe.pipeline_hash != before->pipeline_hash) {
+    notes.emplace_back("--pipeline: another pipeline");
+    for (const auto& [name, value] : before->settings) {
+      if (!is_known(name) && !wanted.contains(name)) wanted[name] = std::nullopt;
+    }
+  }
+  const auto changes = change_settings(recipe, wanted, other_structures);
+  if (!recipe.lost.empty()) {
+    throw Error(ExitCode::no_input, "the case was made with " + flag_of(*recipe.lost.begin(), "...", fields) + ", whose value names the scan and is not known here",
+                "give it again, or drop it with an empty one");
+  }
+  if (recipe.settings.contains("names") && structures.path.empty())
+    throw Error(ExitCode::usage, "--names is for --structures, which the case does not have", "give --structures, or --no-names");
+  for (const auto& [name, value] : recipe.settings) {
+    const bool names_file = std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name && v.in_file_name; });
+    if (names_file || value.find('/') != std::string::npos || without_uid(value) != value) recipe.withheld.insert(name);
+  }
+
+  std::map<std::string, std::string> settings = recipe.settings;
+  settings.erase("names");
+  settings["source"] = source.path.string();
+  settings["case"] = folder.string();
   Pipeline pipeline = parse_pipeline(text, settings);
   const std::string name = pipeline.name;
-  if (!p.structures.empty()) {
+  if (!structures.path.empty()) {
     PipelineNode node;
     node.id = node.stage = "structures";
-    node.inputs["labels"].file = p.structures;
+    node.inputs["labels"].file = structures.path;
     const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
     if (has_ct) node.inputs["image"].node = "ct";
-    node.params["names"] = p.names;
-    if (!p.names.empty()) node.params["only_named"] = "true";
+    const auto names = recipe.settings.find("names");
+    if (names != recipe.settings.end() && !as_the_case_holds_them) {
+      node.params["names"] = names->second;
+      node.params["only_named"] = "true";
+    }
     node.outputs["structures"] = folder / "structures.seg.nrrd";
     pipeline.nodes.push_back(std::move(node));
     for (PipelineNode& n : pipeline.nodes) {
@@ -70,24 +217,60 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   }
   validate(pipeline, io.registry);
 
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  if (ec)
-    throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message(),
-                "choose a folder that you may write to");
+  // What lies in the folder that is not ours is never replaced.
+  std::vector<fs::path> outputs;
+  for (const PipelineNode& n : pipeline.nodes) {
+    for (const auto& [port, path] : n.outputs) outputs.push_back(path);
+  }
+  const auto foreign = foreign_files(folder, outputs);
+  const bool in_the_way = std::any_of(foreign.begin(), foreign.end(), [&](const std::string& f) {
+    return f == "manifest.json" || std::any_of(outputs.begin(), outputs.end(), [&](const fs::path& o) { return o.filename() == f; });
+  });
+  if (!foreign.empty() && (!io.common.force || in_the_way)) {
+    throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds other files than a case: " + list_names(foreign),
+                in_the_way ? "give another name, or move them away" : "give another name, or --force to write beside them");
+  }
+
+  for (const std::string& note : notes) io.context.info(note);
+  if (before) {
+    for (const RecipeChange& c : changes) {
+      const auto flag = [&](const std::optional<std::string>& v) { return v ? flag_of(c.name, *v, fields) : std::string("as the pipeline has it"); };
+      io.context.info("changed: " + flag(c.from) + " -> " + flag(c.to) + (c.why.empty() ? "" : ", since " + c.why));
+    }
+    std::string kept;
+    for (const auto& [setting, value] : recipe.settings) {
+      const bool changed = std::any_of(changes.begin(), changes.end(), [&](const RecipeChange& c) { return c.name == setting; });
+      if (!changed && !given.contains(setting)) kept += " " + flag_of(setting, value, fields);
+    }
+    if (!structures.path.empty() && !other_structures)
+      kept += as_the_case_holds_them ? " --structures (as the case holds them: their file is not known here)" : " --structures";
+    if (!kept.empty()) io.context.info("kept:" + kept + "   (--fresh forgets all, --no-structures and the like drop one)");
+  }
+
   try {
-    const auto results =
-        run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = !io.common.force}, io.context);
-    write_manifest(folder, name, results);
+    auto results = run_pipeline(std::move(pipeline), io.registry,
+                                {.overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }},
+                                io.context);
+    recall_facts(folder, results);
+    update.commit(make_manifest(update, name, results, recipe));
+    remember(source.hash, fs::absolute(source.path).string());
+    if (!as_the_case_holds_them && !structures.path.empty()) remember(structures.hash, fs::absolute(structures.path).string());
+    for (const std::string& setting : recipe.withheld) remember(hash_text(recipe.settings.at(setting)), recipe.settings.at(setting));
     io.end_progress();
     cli::print_results(results, io);
-  } catch (...) {
-    // A folder that was made for nothing goes again; the verdict on a refused scan stays.
+  } catch (const ErrorWithDocument&) {
+    // The verdict on a refused scan stays, where there is no case yet.
     const fs::path verdict = folder / "import.json";
-    const bool refused = fs::exists(verdict) && !fs::exists(provenance_path(verdict));
-    if (is_new && !refused && !fs::exists(folder / "bone.vdb")) fs::remove_all(folder, ec);
     io.end_progress();
-    if (refused && !io.common.quiet) io.err << "what was found is in " << verdict.string() << '\n';
+    if (!is_case && output_exists(update.place(verdict))) {
+      write_file(verdict, read_text(update.place(verdict)));
+      if (!io.common.quiet) io.err << "what was found is in " << verdict.string() << '\n';
+    } else if (!io.common.quiet) {
+      io.err << "the case is as it was; --json prints what was found\n";
+    }
+    throw;
+  } catch (...) {
+    io.end_progress();
     throw;
   }
   if (!io.common.quiet) {

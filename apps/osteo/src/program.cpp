@@ -1,21 +1,7 @@
 #include "commands.h"
-#include "osteo/bone/stages.h"
-#include "osteo/dicom/import.h"
-#include "osteo/distance/compare.h"
-#include "osteo/distance/stages.h"
-#include "osteo/grid/import_bone.h"
-#include "osteo/grid/resample.h"
-#include "osteo/haptics/curve_stage.h"
-#include "osteo/image/crop.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/structures.h"
-#include "osteo/image/threshold.h"
-#include "osteo/mesh/bone_surface.h"
 #include "osteo/meshing/stages.h"
-#include "osteo/tets/skin.h"
 #include "osteo/tissue/calibrate.h"
-#include "osteo/tissue/stages.h"
-#include "osteo/view/snapshot.h"
+#include "stages.h"
 
 namespace osteo {
 
@@ -36,29 +22,7 @@ cli::Program make_osteo_program() {
     p.licence += ";\nit contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n";
   }
   p.licence += "Not a medical device: for rehearsal, teaching and research, not for treatment decisions.";
-  p.registry.add<ImportStage>();
-  p.registry.add<ImportBoneStage>();
-  p.registry.add<CropStage>();
-  p.registry.add<ThresholdStage>();
-  p.registry.add<ResampleStage>();
-  p.registry.add<SurfaceStage>();
-  p.registry.add<MeshInfoStage>();
-  p.registry.add<MeshRepairStage>();
-  p.registry.add<CompareStage>();
-  p.registry.add<DistanceStage>();
-  p.registry.add<DistanceAtStage>();
-  p.registry.add<VoxelizeStage>();
-  p.registry.add<TetrahedralizeStage>();
-  p.registry.add<SkinStage>();
-  p.registry.add<FemStage>();
-  p.registry.add<CalibrateStage>();
-  p.registry.add<SimulateStage>();
-  p.registry.add<SawStage>();
-  p.registry.add<PiecesStage>();
-  p.registry.add<CurveStage>();
-  p.registry.add<SnapshotStage>();
-  p.registry.add<StructuresStage>();
-  p.registry.add<PhantomStage>();
+  p.registry = osteo_stages();
   p.add<ListCommand>();
   p.add<InfoCommand>();
   p.add<SeriesCommand>();

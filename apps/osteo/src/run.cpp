@@ -48,7 +48,7 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
         io.out << "  " << port << " <- " << (in.node.empty() ? in.file.string() : in.node + (in.port.empty() ? "" : "." + in.port)) << '\n';
       for (const auto& [name, value] : n.params) io.out << "  " << name << " = " << value << '\n';
       for (const auto& [port, path] : n.outputs)
-        io.out << "  " << port << " -> " << path.string() << (fs::exists(path) ? " (exists)" : "") << '\n';
+        io.out << "  " << port << " -> " << path.string() << (output_exists(path) ? " (exists)" : "") << '\n';
     }
     return 0;
   }
@@ -73,7 +73,7 @@ int DocsCommand::run(const Params& p, cli::Invocation& io) {
   for (const auto& [name, content] : pages) {
     const fs::path path = folder / name;
     if (!p.check) {
-      fs::create_directories(folder);
+      make_output_folder(folder);
       write_file(path, content);
     } else if (!fs::exists(path) || read_text(path) != content) {
       io.err << "stale: " << path.string() << '\n';

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <mutex>
@@ -56,10 +57,10 @@ class Temporary {
   throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': " + std::strerror(error), advice);
 }
 
-void sync_path(const fs::path& path, const fs::path& shown) {
+void sync_path(const fs::path& path, const fs::path& shown, int (*sync)(int) = ::fsync) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) throw_write_error(shown, errno);
-  const int rc = ::fsync(fd);
+  const int rc = sync(fd);
   const int error = errno;
   ::close(fd);
   // Some file systems cannot sync folders; that is no reason to lose a result.
@@ -78,6 +79,7 @@ void prepare_parent(const fs::path& path) {
   const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
   std::error_code ec;
   if (!fs::is_directory(parent, ec)) {
+    if (ec && ec.value() != ENOENT) throw_write_error(path, ec.value());
     throw Error(ExitCode::cannot_write, "cannot write '" + path.string() + "': there is no folder '" + parent.string() + "'",
                 "create the folder first");
   }
@@ -138,6 +140,12 @@ std::string read_text(const fs::path& path) {
 
 void write_atomically(const fs::path& path, const std::function<void(const fs::path&)>& write) {
   prepare_parent(path);
+  std::error_code ec;
+  if (const auto status = fs::symlink_status(path, ec); fs::is_directory(fs::status(path, ec))) {
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a folder, not a file", "give another name");
+  } else if (fs::is_other(status)) {
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a device or pipe, not a file", "give another name");
+  }
   const Temporary temporary(path);
   write(temporary.path());
   sync_path(temporary.path(), path);
@@ -164,33 +172,98 @@ void write_file(const fs::path& path, std::string_view content) {
   });
 }
 
-void write_folder_atomically(const fs::path& path, bool replace, const std::function<void(const fs::path&)>& fill) {
-  const fs::path target = path.has_filename() ? path : path.parent_path();
-  prepare_parent(target);
-  if (fs::exists(target) && !replace && !(fs::is_directory(target) && fs::is_empty(target))) {
-    throw Error(ExitCode::cannot_write, "'" + target.string() + "' exists already", "give another name, or --force to replace it");
-  }
-  const Temporary temporary(target);
+fs::path output_folder(const fs::path& path) {
   std::error_code ec;
+  fs::path target = path.lexically_normal();
+  if (!target.has_filename() && target.has_parent_path() && target != target.root_path()) target = target.parent_path();
+  if (!output_exists(target)) return target;
+  if (!fs::is_directory(fs::status(target, ec))) {
+    const bool nowhere = fs::is_symlink(target, ec) && !fs::exists(target, ec);
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a " + (nowhere ? "link that leads nowhere" : "file") + ", not a folder",
+                "give another name, or move it away");
+  }
+  target = fs::canonical(target, ec);
+  if (ec) throw_write_error(path, ec.value());
+  const fs::path here = fs::current_path(ec);
+  const auto [end, unused] = std::mismatch(target.begin(), target.end(), here.begin(), here.end());
+  if (end == target.end()) {
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is the folder you are in, or holds it: it cannot be replaced",
+                "give the name of a new folder");
+  }
+  return target;
+}
+
+namespace {
+
+// One step: at any moment both names are there. False where the file system cannot.
+bool exchange(const fs::path& a, const fs::path& b) {
+  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
+}
+
+}  // namespace
+
+void write_folder_atomically(const fs::path& path, const std::function<void(const fs::path&)>& may_replace,
+                             const std::function<void(const fs::path&)>& fill) {
+  const fs::path target = output_folder(path);
+  prepare_parent(target);
+  std::error_code ec;
+  const auto ask = [&] {
+    if (!output_exists(target) || fs::is_empty(target, ec)) return;
+    if (!may_replace) {
+      throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
+    }
+    may_replace(target);
+  };
+  ask();
+  const Temporary temporary(target);
   fs::create_directory(temporary.path(), ec);
   if (ec) throw_write_error(target, ec.value());
   fill(temporary.path());
-  sync_path(temporary.path(), target);
+  sync_path(temporary.path(), target, ::syncfs);  // all of it at once, however many files
   require_space_left(target);
-  if (fs::exists(target)) {
-    const Temporary old(target);
-    fs::rename(target, old.path(), ec);
-    if (ec) throw_write_error(target, ec.value());
-    fs::rename(temporary.path(), target, ec);
-    if (ec) {
-      const int error = ec.value();
-      fs::rename(old.path(), target, ec);
-      throw_write_error(target, error);
-    }
-    return;
-  }
+  ask();
+  // An empty folder, and a name that is free, are taken by the plain rename.
   fs::rename(temporary.path(), target, ec);
+  if (!ec || exchange(temporary.path(), target)) return;
+  if (ec.value() != ENOTEMPTY && ec.value() != EEXIST) throw_write_error(target, ec.value());
+  // Some file systems cannot exchange: the old folder steps aside under a name of its own, which no clean-up removes, until the new one is there.
+  const fs::path aside = target.string() + ".old-" + std::to_string(::getpid());
+  fs::rename(target, aside, ec);
   if (ec) throw_write_error(target, ec.value());
+  fs::rename(temporary.path(), target, ec);
+  if (ec) {
+    const int error = ec.value();
+    fs::rename(aside, target, ec);
+    throw_write_error(target, error);
+  }
+  fs::remove_all(aside, ec);
+}
+
+bool output_exists(const fs::path& path) {
+  std::error_code ec;
+  const auto status = fs::symlink_status(path, ec);
+  if (ec && ec.value() != ENOENT && ec.value() != ENOTDIR) throw_write_error(path, ec.value());
+  return fs::exists(status);
+}
+
+void make_output_folder(const fs::path& path) {
+  std::error_code ec;
+  if (output_exists(path) && !fs::is_directory(path, ec)) {
+    if (ec) throw_write_error(path, ec.value());
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a file, not a folder", "give another name, or move it away");
+  }
+  fs::create_directories(path, ec);
+  if (ec) throw_write_error(path, ec.value());
+}
+
+Error error_of(const fs::filesystem_error& error) {
+  std::error_code ec;
+  const fs::path path = error.path2().empty() ? error.path1() : error.path2();
+  const bool there = fs::exists(fs::symlink_status(path, ec));
+  if (there && ::access(path.c_str(), fs::is_directory(path, ec) ? R_OK | X_OK : R_OK) != 0) {
+    return {ExitCode::cannot_read, "cannot read '" + path.string() + "': " + error.code().message(), "ask the owner for permission"};
+  }
+  return {ExitCode::cannot_write, "cannot use '" + path.string() + "': " + error.code().message(), "choose a place that you may write to"};
 }
 
 void remove_temporaries() noexcept {
@@ -247,13 +320,31 @@ std::string hash_path(const fs::path& path) {
     return h.hex();
   }
   std::vector<std::string> hashes;
-  for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file()) hashes.push_back(hash_path(entry.path()));
+  try {
+    for (const auto& entry : fs::recursive_directory_iterator(path)) {
+      if (entry.is_regular_file()) hashes.push_back(hash_path(entry.path()));
+    }
+  } catch (const fs::filesystem_error& e) {
+    throw error_of(e);
   }
   std::sort(hashes.begin(), hashes.end());
   std::string all;
   for (const auto& h : hashes) all += h;
   return hash_text(all);
+}
+
+std::map<std::string, std::string> hash_files(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  try {
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      const bool plain = entry.is_regular_file() && !entry.is_symlink();
+      if (!plain && entry.is_directory() && !entry.is_symlink()) continue;
+      files[entry.path().lexically_relative(folder).string()] = plain ? hash_path(entry.path()) : std::string();
+    }
+  } catch (const fs::filesystem_error& e) {
+    throw error_of(e);
+  }
+  return files;
 }
 
 double peak_memory_mb() {

@@ -27,6 +27,7 @@ struct Parsed {
   std::vector<std::string> positionals;
   std::map<std::string, std::string> files;  // --mask FILE, --labels-out FILE: flag without dashes -> file
   std::vector<std::pair<std::string, std::string>> settings;
+  std::set<std::string> given;
 };
 
 Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags,
@@ -71,6 +72,7 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
     }
     const auto field = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.flag() == name; });
     if (field != fields.end()) {
+      parsed.given.emplace(field->doc.name);
       if (field->kind() == "flag") {
         field->from_text(value.value_or("true"));
       } else {
@@ -78,12 +80,14 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       }
       continue;
     }
-    // --no-fill for a flag that is on by default.
-    if (name.starts_with("--no-")) {
-      const auto off = std::find_if(fields.begin(), fields.end(),
-                                    [&](const FieldRef& f) { return f.kind() == "flag" && f.flag() == "--" + name.substr(5); });
+    // --no-fill for a flag that is on by default; --no-structures for a text: left empty.
+    if (name.starts_with("--no-") && !value) {
+      const auto off = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) {
+        return (f.kind() == "flag" || f.kind() == "text") && f.flag() == "--" + name.substr(5);
+      });
       if (off != fields.end()) {
-        off->from_text("false");
+        parsed.given.emplace(off->doc.name);
+        off->from_text(off->kind() == "flag" ? "false" : "");
         continue;
       }
     }
@@ -91,6 +95,12 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
     throw Error(ExitCode::usage, "there is no flag " + name, near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
   }
   return parsed;
+}
+
+// " (2 names), but 3 were given"
+std::string count_text(std::size_t wanted, std::size_t given) {
+  return " (" + std::to_string(wanted) + (wanted == 1 ? " name" : " names") + "), but " +
+         (given == 0 ? "none was" : std::to_string(given) + (given == 1 ? " was" : " were")) + " given";
 }
 
 int run_stage(const Registry& registry, Stage& stage, const std::vector<std::string>& args, Invocation& invocation, Common::Params& common,
@@ -121,9 +131,7 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
   if (parsed.positionals.size() != required) {
     std::string wanted;
     for (const auto& n : names) wanted += " " + n;
-    throw Error(ExitCode::usage,
-                "osteo " + info.name + " takes" + wanted + "; " + std::to_string(parsed.positionals.size()) + " of " +
-                    std::to_string(required) + " were given",
+    throw Error(ExitCode::usage, "osteo " + info.name + " takes" + wanted + count_text(required, parsed.positionals.size()),
                 "'osteo help " + info.name + "' tells more");
   }
   ready();
@@ -156,9 +164,13 @@ int run_stage(const Registry& registry, Stage& stage, const std::vector<std::str
   return 0;
 }
 
-void print_error(const Error& e, std::ostream& err) {
+// To people on standard error, with --json to programs on standard output too.
+int fail(const Error& e, bool json, std::ostream& out, std::ostream& err) {
   err << "osteo: " << e.what() << '\n';
   if (!e.advice().empty()) err << "  " << e.advice() << '\n';
+  if (json) out << error_json(e) << std::flush;
+  remove_temporaries();
+  return static_cast<int>(e.code());
 }
 
 }  // namespace
@@ -212,7 +224,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   }
 
   Common::Params common;
-  Invocation invocation{program.registry, {}, {}, {}, {}, out, err, [] {}};
+  Invocation invocation{program.registry, {}, {}, {}, {}, {}, out, err, [] {}};
   const auto ready = [&] {
     printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
     invocation.common = common;
@@ -233,7 +245,9 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     Command* const series = program.find("series");
     auto fields = series->fields();
     for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
-    invocation.arguments = parse(args, fields, {}, false).positionals;
+    Parsed parsed = parse(args, fields, {}, false);
+    invocation.arguments = std::move(parsed.positionals);
+    invocation.given = std::move(parsed.given);
     ready();
     code = series->run(invocation);
   } else if (command == nullptr) {
@@ -252,6 +266,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
     }
     invocation.arguments = std::move(parsed.positionals);
     invocation.settings = std::move(parsed.settings);
+    invocation.given = std::move(parsed.given);
     ready();
     code = command->run(invocation);
   }
@@ -267,28 +282,26 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   ::sigaction(SIGTERM, &action, nullptr);
   ::signal(SIGXFSZ, SIG_IGN);
   std::unique_ptr<ProgressPrinter> printer;
+  const std::vector<std::string> args{argv + 1, argv + argc};
+  const bool json = std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") != std::find(args.begin(), args.end(), "--");
+  const auto failed = [&](const Error& e) {
+    if (printer) printer->clear();
+    return fail(e, json, out, err);
+  };
   try {
-    const int code = dispatch(program, {argv + 1, argv + argc}, out, err, printer);
+    const int code = dispatch(program, args, out, err, printer);
     if (printer) printer->clear();
     out.flush();
     if (!out) throw Error(ExitCode::cannot_write, "standard output cannot be written");
     return code;
   } catch (const Error& e) {
-    if (printer) printer->clear();
-    print_error(e, err);
-    remove_temporaries();
-    return static_cast<int>(e.code());
+    return failed(e);
+  } catch (const fs::filesystem_error& e) {
+    return failed(error_of(e));
   } catch (const std::bad_alloc&) {
-    if (printer) printer->clear();
-    print_error(Error(ExitCode::resources, "out of memory", "use larger voxels or a smaller region"), err);
-    remove_temporaries();
-    return static_cast<int>(ExitCode::resources);
+    return failed(Error(ExitCode::resources, "out of memory", "use larger voxels or a smaller region"));
   } catch (const std::exception& e) {
-    if (printer) printer->clear();
-    print_error(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"),
-                err);
-    remove_temporaries();
-    return static_cast<int>(ExitCode::unspecified);
+    return failed(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"));
   }
 }
 

@@ -14,8 +14,9 @@
 
 namespace osteo {
 
-void save_dicom_series(const Image& image, const fs::path& folder, const Context& context) {
-  write_folder_atomically(folder, false, [&](const fs::path& temporary) {
+void save_dicom_series(const Image& image, const fs::path& folder, const Context& context,
+                       const std::function<void(const fs::path&)>& may_replace) {
+  write_folder_atomically(folder, may_replace, [&](const fs::path& temporary) {
     const QuietVtk quiet;
     vtkNew<vtkDICOMMetaData> meta;
     meta->Set(DC::PatientName, "OSTEOTOME^PHANTOM");

@@ -43,10 +43,7 @@ Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options
   if (p.verdict.modality.empty()) p.verdict.modality = series.modality;
   if (series.strays) p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
   p.verdict.why_chosen = series.recommended ? series.why : "asked for";
-  if (p.verdict.refused()) {
-    const std::string& code = first_error(p.verdict).code;
-    throw Refused(p.verdict, code == code::gap_too_wide || code == code::hole_too_wide ? ExitCode::failed : ExitCode::corrupt);
-  }
+  if (p.verdict.refused()) throw Refused(p.verdict);
   return p;
 }
 
@@ -107,13 +104,13 @@ void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count) {
     v.slices[k].output_index = v.resampled ? p.slices[k].along_mm / frame.spacing_mm.z : static_cast<double>(k);
   }
   dicom::check_values(v, count, p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm);
-  if (v.refused()) throw Refused(v, ExitCode::corrupt);
+  if (v.refused()) throw Refused(v);
 }
 
 }  // namespace
 
-Refused::Refused(const Verdict& verdict, ExitCode exit_code)
-    : Error(exit_code, why(verdict), first_error(verdict).advice), verdict_(std::make_shared<const Verdict>(verdict)) {}
+Refused::Refused(const Verdict& verdict)
+    : Error(ExitCode::corrupt, why(verdict), first_error(verdict).advice), verdict_(std::make_shared<const Verdict>(verdict)) {}
 
 DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& options, const Context& context) {
   const QuietVtk quiet;

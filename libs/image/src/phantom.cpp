@@ -249,7 +249,7 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   for (std::size_t axis = 0; axis < 3; ++axis) spread(means, frame, axis, context.threads);
   parallel_for(means.size(), 1 << 16, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; ++at) {
-      const double noise = p.noise_hu > 0 ? p.noise_hu * gaussian(static_cast<std::uint64_t>(p.seed), at) : 0;
+      const double noise = p.noise_hu > 0 ? p.noise_hu * gaussian(context.seed, at) : 0;
       hu[at] = static_cast<std::int16_t>(std::clamp(std::lround(static_cast<double>(means[at]) + noise), -1024L, 3071L));
     }
   });
@@ -265,7 +265,7 @@ StageInfo PhantomStage::info() {
           .synopsis = "a synthetic CT of a head whose every boundary is known",
           .description =
               "Cortical and cellular bone, facial nerve canals, sigmoid sinuses, ossicles, a jaw, and a bead on the left side "
-              "only. Voxels hold the mean over their volume plus noise. Give a folder as output for a DICOM series.",
+              "only. Voxels hold the mean over their volume plus noise (--seed). Give a folder as output for a DICOM series.",
           .inputs = {},
           .outputs = {{"image", {DataKind::image}, "CT in HU"},
                       {"labels",

@@ -88,8 +88,12 @@ Data load_data(const fs::path& path, std::span<const DataKind> accepted, const C
   return labels ? Data(load_labels(path, context)) : Data(load_image(path, context));
 }
 
+bool becomes_folder(DataKind kind, const fs::path& path) {
+  return kind == DataKind::image && !path.has_extension();
+}
+
 void require_savable(DataKind kind, const fs::path& path) {
-  if (kind == DataKind::image && !path.has_extension()) return;
+  if (becomes_folder(kind, path)) return;
   const std::string name = path.filename().string();
   for (const auto& s : kSuffixes) {
     if (s.kind != kind) continue;
@@ -104,12 +108,12 @@ void require_savable(DataKind kind, const fs::path& path) {
   throw Error(ExitCode::usage, "cannot write a " + std::string(kind_name(kind)) + " as '" + name + "'", "name it " + suffixes_of(kind));
 }
 
-void save_data(const Data& data, const fs::path& path, const Context& context) {
+void save_data(const Data& data, const fs::path& path, const Context& context, const std::function<void(const fs::path&)>& may_replace) {
   require_savable(kind_of(data), path);
   switch (kind_of(data)) {
     case DataKind::image:
-      if (!path.has_extension()) {
-        save_dicom_series(std::get<Image>(data), path, context);
+      if (becomes_folder(DataKind::image, path)) {
+        save_dicom_series(std::get<Image>(data), path, context, may_replace);
       } else {
         save_image(std::get<Image>(data), path);
       }

@@ -71,6 +71,12 @@ std::vector<PipelineVariable> read_variables(std::string_view text) {
   for (const auto& [name, v] : root["variables"].items()) {
     allow_keys(v, "variable '" + name + "'", {"help", "default"});
     PipelineVariable variable{name, v.value("help", ""), std::nullopt};
+    for (const json& s : root.value("stages", json::array())) {
+      const json inputs = s.is_object() ? s.value("in", json::object()) : json::object();
+      for (const auto& [port, input] : inputs.items()) {
+        variable.in_file_name |= input.is_object() && input.value("file", json()).dump().find("${" + name + "}") != std::string::npos;
+      }
+    }
     if (v.contains("default")) variable.fallback = scalar_text(v["default"], "variable '" + name + "'");
     result.push_back(std::move(variable));
   }

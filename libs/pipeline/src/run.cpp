@@ -10,6 +10,9 @@
 #include "osteo/pipeline/report_json.h"
 
 namespace osteo {
+
+extern const char* const kCommit;  // made at build time, see version.cmake
+
 namespace {
 
 using nlohmann::ordered_json;
@@ -56,12 +59,6 @@ void set_params(Stage& stage, const PipelineNode& node) {
   }
 }
 
-// A DICOM UID names a scan of a patient: the key still depends on it, the record says only that there was one.
-std::string without_uid(const std::string& text) {
-  const bool digits = text.find_first_not_of("0123456789.") == std::string::npos;
-  return digits && std::count(text.begin(), text.end(), '.') >= 3 ? "(UID)" : text;
-}
-
 class Runner {
  public:
   Runner(const Pipeline& pipeline, const Registry& registry, const RunOptions& options, const Context& context)
@@ -84,7 +81,9 @@ class Runner {
     std::size_t to_run = 0;
     for (std::size_t n = 0; n < stages_.size(); ++n) {
       fresh[n] = options_.reuse && outputs_are_fresh(n);
-      if (!fresh[n] && !pipeline_.nodes[n].outputs.empty()) mark_needed(n, fresh);
+      if (fresh[n] || pipeline_.nodes[n].outputs.empty()) continue;
+      mark_needed(n, fresh);
+      for (const auto& [port, path] : pipeline_.nodes[n].outputs) check_place(*find_port(stages_[n]->info().outputs, port), path);
     }
     for (const bool b : needed_) to_run += b ? 1 : 0;
     std::size_t done = 0;
@@ -112,21 +111,34 @@ class Runner {
   void refuse_to_overwrite() const {
     for (const auto& node : pipeline_.nodes) {
       for (const auto& [port, path] : node.outputs) {
-        if (fs::exists(path))
+        if (output_exists(path))
           throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "give another name, or --force to replace it");
       }
     }
   }
 
-  // What the result depends on: the stage and its version, every parameter, and the content of the inputs.
+  // Before hours of work rather than after: is there something in the way that must not be replaced?
+  static void check_place(const Port& port, const fs::path& path) {
+    if (!output_exists(path)) return;
+    if (becomes_folder(port.kinds.front(), path)) {
+      require_replaceable(output_folder(path), path);
+    } else if (std::error_code ec; fs::is_directory(path, ec)) {
+      throw Error(ExitCode::cannot_write, "'" + path.string() + "' is a folder, not a file", "give another name");
+    }
+  }
+
+  [[nodiscard]] fs::path written(const fs::path& path) const { return options_.place ? options_.place(path) : path; }
+
+  // What the result depends on: the stage and its version, every parameter, the seed, and the content of the inputs.
   void compute_key(std::size_t n) {
     const PipelineNode& node = pipeline_.nodes[n];
     NodeResult& result = results_[n];
     result.id = node.id;
     result.stage = node.stage;
     result.outputs = node.outputs;
-    std::string text = node.stage + "/" + std::to_string(stages_[n]->info().version) + "\n";
+    std::string text = node.stage + "/" + std::to_string(stages_[n]->info().version) + "\nseed=" + std::to_string(context_.seed) + "\n";
     for (const auto& f : stages_[n]->fields()) {
+      // The key depends on a UID, the record says only that there was one.
       result.params[std::string(f.doc.name)] = without_uid(f.to_text());
       text += std::string(f.doc.name) + "=" + f.to_text() + "\n";
     }
@@ -211,8 +223,9 @@ class Runner {
       }
     } catch (const ErrorWithDocument& e) {
       const auto it = node.outputs.find(e.port());
-      if (it != node.outputs.end()) save_data(e.document(), it->second, context);
-      throw pipeline_.nodes.size() == 1 ? static_cast<const Error&>(e) : e.in("stage '" + node.id + "'");
+      if (it != node.outputs.end()) save_data(e.document(), written(it->second), context);
+      if (pipeline_.nodes.size() == 1) throw;
+      throw ErrorWithDocument(e.in("stage '" + node.id + "'"), e.port(), e.document());
     } catch (const Error& e) {
       if (e.code() == ExitCode::cancelled || pipeline_.nodes.size() == 1) throw;
       throw e.in("stage '" + node.id + "'");
@@ -223,15 +236,15 @@ class Runner {
   }
 
   void save_output(std::size_t n, const std::string& port, const Data& value, const fs::path& path, const Context& context) {
-    const bool is_new = !fs::exists(path);
-    if (fs::is_directory(path) && (options_.overwrite || options_.reuse)) fs::remove_all(path);
-    save_data(value, path, context);
+    const fs::path place = written(path);
+    const bool is_new = !output_exists(place);
+    save_data(value, place, context, [&](const fs::path& old) { require_replaceable(old, path); });
     try {
-      save_provenance(n, port, path, context);
+      save_provenance(n, port, place, context);
     } catch (...) {
       // An output is not complete without its record.
       std::error_code ignored;
-      if (is_new) fs::remove_all(path, ignored);
+      if (is_new) fs::remove_all(place, ignored);
       throw;
     }
   }
@@ -252,6 +265,7 @@ class Runner {
     p["inputs"] = inputs;
     p["key"] = result.key;
     p["output_hash"] = result.output_hashes[port];
+    if (fs::is_directory(path)) p["files"] = hash_files(path);
     p["report"] = report_to_json(result.report);
     p["seed"] = context.seed;
     p["seconds"] = result.seconds;
@@ -351,13 +365,51 @@ std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry
   return Runner(pipeline, registry, options, context).run();
 }
 
+void require_replaceable(const fs::path& folder, const fs::path& output) {
+  std::map<std::string, std::string> ours;
+  bool whole = false;
+  try {
+    const auto p = ordered_json::parse(read_text(provenance_path(output)));
+    if (p.contains("files")) p["files"].get_to(ours);
+    whole = ours.empty() && p.value("output_hash", "") == hash_path(folder);
+  } catch (const std::exception&) {
+    // An unreadable record is no record.
+  }
+  std::vector<std::string> foreign;
+  for (const auto& [name, hash] : hash_files(folder)) {
+    const auto it = ours.find(name);
+    if (!whole && (hash.empty() || it == ours.end() || it->second != hash)) foreign.push_back(name);
+  }
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(folder, ec)) {
+    if (entry.is_directory() && !entry.is_symlink() && fs::is_empty(entry.path(), ec)) foreign.push_back(entry.path().filename().string());
+  }
+  if (foreign.empty()) return;
+  throw Error(ExitCode::cannot_write, "'" + output.string() + "' holds what this program has no record of: " + list_names(foreign),
+              "give another name, or move them away; --force replaces only what the program made");
+}
+
+std::string without_uid(const std::string& text) {
+  const bool digits = text.find_first_not_of("0123456789.") == std::string::npos;
+  return digits && std::count(text.begin(), text.end(), '.') >= 3 ? "(UID)" : text;
+}
+
+std::string list_names(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kShown, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
 fs::path provenance_path(const fs::path& output) {
   fs::path path = output.has_filename() ? output : output.parent_path();
   return path += ".prov.json";
 }
 
 std::string_view program_version() {
-  return OSTEO_VERSION;
+  static const std::string text = std::string(OSTEO_VERSION) + " (" + kCommit + ")";
+  return text;
 }
 
 }  // namespace osteo

@@ -1,5 +1,6 @@
 #include "osteo/vtk/vtkOsteoStage.h"
 
+#include <vtkAlgorithmOutput.h>
 #include <vtkDemandDrivenPipeline.h>
 #include <vtkErrorCode.h>
 #include <vtkImageData.h>
@@ -133,6 +134,13 @@ void vtkOsteoStage::SetSourcePath(const std::string& path) {
   this->Modified();
 }
 
+void vtkOsteoStage::SetSourcePath(const std::string& input, const std::string& path) {
+  auto& own = this->SourcePaths[input];
+  if (path == own) return;
+  own = path;
+  this->Modified();
+}
+
 int vtkOsteoStage::GetInputPortIndex(const std::string& name) const {
   for (std::size_t p = 0; p < this->StageInputOfPort.size(); ++p) {
     if (this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[p])].name == name) return static_cast<int>(p);
@@ -217,36 +225,26 @@ bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
   return true;
 }
 
-// Whoever reads an image wants to know its extent before it exists. A stage without an image as input is run here for that; one
-// with an image keeps that image's lattice (Execute checks that it did).
+// Whoever reads an image wants to know its extent before it exists. Only the stage itself knows it (crop finds its box in the voxels), so
+// a stage that makes an image is run here; Execute hands over what came out.
 bool vtkOsteoStage::Inform(vtkInformationVector** inputs, vtkInformationVector* outputs) {
   const auto& ports = this->Stage->info().outputs;
   const bool makes_image = std::any_of(ports.begin(), ports.end(), [](const auto& p) { return is_image(p.kinds.front()); });
   if (!makes_image) return true;
-  const bool from_image = this->GetNumberOfInputPorts() > 0 && inputs[0]->GetNumberOfInformationObjects() > 0 &&
-                          vtkImageData::SafeDownCast(inputs[0]->GetInformationObject(0)->Get(vtkDataObject::DATA_OBJECT())) != nullptr;
-  if (!from_image) {
-    for (int p = 0; p < this->GetNumberOfInputPorts(); ++p) {
-      for (int c = 0; c < this->GetNumberOfInputConnections(p); ++c) this->GetInputAlgorithm(p, c)->Update();
-      this->Results.clear();
+  for (int p = 0; p < this->GetNumberOfInputPorts(); ++p) {
+    for (int c = 0; c < this->GetNumberOfInputConnections(p); ++c) {
+      vtkAlgorithmOutput* const from = this->GetInputConnection(p, c);
+      from->GetProducer()->Update(from->GetIndex());
     }
-    if ((this->Results.empty() || this->ResultsTime < this->Superclass::GetMTime()) && !this->Run(inputs)) return false;
-    for (std::size_t p = 0; p < ports.size(); ++p) {
-      vtkSmartPointer<vtkImageData> image;
-      if (const auto* i = std::get_if<osteo::Image>(&this->Results[p])) image = osteo::to_vtk(*i);
-      if (const auto* l = std::get_if<osteo::Labels>(&this->Results[p])) image = osteo::to_vtk(*l);
-      if (image) set_image_information(outputs->GetInformationObject(static_cast<int>(p)), image);
-    }
-    return true;
+    this->Results.clear();
   }
-  vtkInformation* const in = inputs[0]->GetInformationObject(0);
+  if ((this->Results.empty() || this->ResultsTime < this->Superclass::GetMTime()) && !this->Run(inputs)) return false;
   for (std::size_t p = 0; p < ports.size(); ++p) {
-    if (!is_image(ports[p].kinds.front()) || !in->Has(Pipeline::WHOLE_EXTENT())) continue;
-    vtkInformation* const out = outputs->GetInformationObject(static_cast<int>(p));
-    out->CopyEntry(in, Pipeline::WHOLE_EXTENT());
-    for (auto* const key : {vtkDataObject::SPACING(), vtkDataObject::ORIGIN(), vtkDataObject::DIRECTION()}) {
-      if (in->Has(key)) out->CopyEntry(in, key);
-    }
+    if (!is_image(ports[p].kinds.front())) continue;
+    vtkSmartPointer<vtkImageData> image = vtkSmartPointer<vtkImageData>::New();  // empty, for an output that was not made
+    if (const auto* i = std::get_if<osteo::Image>(&this->Results[p])) image = osteo::to_vtk(*i);
+    if (const auto* l = std::get_if<osteo::Labels>(&this->Results[p])) image = osteo::to_vtk(*l);
+    set_image_information(outputs->GetInformationObject(static_cast<int>(p)), image);
   }
   return true;
 }
@@ -269,7 +267,9 @@ bool vtkOsteoStage::Run(vtkInformationVector** inputs) {
     std::vector<osteo::Data> values(info.inputs.size());
     for (std::size_t i = 0; i < info.inputs.size(); ++i) {
       if (info.inputs[i].kinds.front() == DataKind::source) {
-        if (!this->SourcePath.empty()) values[i] = osteo::Source{this->SourcePath};
+        const auto own = this->SourcePaths.find(info.inputs[i].name);
+        const auto& path = own != this->SourcePaths.end() ? own->second : this->SourcePath;
+        if (!path.empty()) values[i] = osteo::Source{path};
       }
     }
     for (std::size_t p = 0; p < this->StageInputOfPort.size(); ++p) {
@@ -298,18 +298,10 @@ bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector*
     vtkInformation* const info = outputs->GetInformationObject(static_cast<int>(p));
     vtkDataObject* const object = info->Get(vtkDataObject::DATA_OBJECT());
     const osteo::Data& value = this->Results[p];
+    if (std::holds_alternative<std::monostate>(value)) object->Initialize();  // an output that was not made, this time
     if (auto* const image = vtkImageData::SafeDownCast(object)) {
       if (const auto* i = std::get_if<osteo::Image>(&value)) image->ShallowCopy(osteo::to_vtk(*i));
       if (const auto* l = std::get_if<osteo::Labels>(&value)) image->ShallowCopy(osteo::to_vtk(*l));
-      int promised[6], extent[6];
-      info->Get(Pipeline::WHOLE_EXTENT(), promised);
-      image->GetExtent(extent);
-      if (extent[1] - extent[0] != promised[1] - promised[0] || extent[3] - extent[2] != promised[3] - promised[2] ||
-          extent[5] - extent[4] != promised[5] - promised[4]) {
-        this->Fail(nullptr, "the output's extent differs from the one announced");
-        return false;
-      }
-      image->SetExtent(promised);
     } else if (auto* const poly = vtkPolyData::SafeDownCast(object)) {
       if (const auto* s = std::get_if<osteo::Surface>(&value)) poly->ShallowCopy(osteo::to_vtk(**s));
     } else if (auto* const cells = vtkUnstructuredGrid::SafeDownCast(object)) {

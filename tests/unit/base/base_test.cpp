@@ -102,22 +102,6 @@ TEST(Files, AtomicWriteLeavesOldFileOnFailure) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
 }
 
-TEST(Files, FolderIsReplacedWholeOrNotAtAll) {
-  const auto folder = fresh_folder() / "d";
-  write_folder_atomically(folder, false, [](const auto& t) { std::ofstream(t / "one") << 1; });
-  EXPECT_THROW(write_folder_atomically(folder, false, [](const auto&) {}), Error);
-  EXPECT_THROW(write_folder_atomically(folder, true,
-                                       [](const auto& t) {
-                                         std::ofstream(t / "two") << 2;
-                                         throw Error(ExitCode::failed, "stop");
-                                       }),
-               Error);
-  EXPECT_TRUE(std::filesystem::exists(folder / "one"));
-  write_folder_atomically(folder, true, [](const auto& t) { std::ofstream(t / "two") << 2; });
-  EXPECT_FALSE(std::filesystem::exists(folder / "one"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "two"));
-}
-
 TEST(Files, HashTellsContentNotNames) {
   const auto a = fresh_folder() / "a";
   std::filesystem::create_directories(a);

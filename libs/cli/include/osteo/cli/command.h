@@ -2,6 +2,7 @@
 #pragma once
 #include <iosfwd>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -61,6 +62,7 @@ struct Invocation {
   const Registry& registry;
   Common::Params common;
   std::vector<std::string> arguments;                         ///< positionals, in order
+  std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
   std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
   Context context;
   std::ostream& out;
@@ -104,7 +106,9 @@ struct Program {
   [[nodiscard]] Command* find(std::string_view name) const;
 };
 
-/// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only.
+/// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only. With --json a
+/// failure is told there too: { "error": { "exit_code", "name", "message", "advice" } }, and beside it what the stage had to show of it,
+/// such as the "verdict" on a refused scan.
 int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err);
 
 }  // namespace osteo::cli

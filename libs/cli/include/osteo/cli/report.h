@@ -1,14 +1,21 @@
 // What was done, told to people on standard error or to programs as JSON on standard output.
 #pragma once
 #include <filesystem>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "osteo/base/error.h"
 #include "osteo/cli/command.h"
 #include "osteo/pipeline/pipeline.h"
 
 namespace osteo::cli {
 
 void print_results(const std::vector<NodeResult>& results, Invocation& invocation);
+/// A failure as JSON, with the document that an ErrorWithDocument carries.
+[[nodiscard]] std::string error_json(const Error& error);
+/// "mask_volume_mm3", 511409.0 -> "mask volume", "511409 mm3": for people.
+[[nodiscard]] std::pair<std::string, std::string> fact_text(const std::string& key, const ReportValue& value);
 /// "412345", "0.031", "yes": short enough for a table.
 [[nodiscard]] std::string short_text(const ReportValue& value);
 

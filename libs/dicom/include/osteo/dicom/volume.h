@@ -11,10 +11,10 @@
 
 namespace osteo {
 
-/// A series that is not taken, with the reasons. what() is the first error of the verdict.
+/// A series that is not taken, with the reasons. what() is the first error of the verdict; the code is that of an input, corrupt.
 class Refused : public Error {
  public:
-  Refused(const Verdict& verdict, ExitCode exit_code);
+  explicit Refused(const Verdict& verdict);
   [[nodiscard]] const Verdict& verdict() const { return *verdict_; }
 
  private:

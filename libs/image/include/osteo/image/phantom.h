@@ -41,7 +41,6 @@ struct PhantomParams {
   double spacing_mm = 1.0;
   double slice_mm = 0;
   double noise_hu = 15;
-  int seed = 1;
 };
 
 struct Phantom {
@@ -49,7 +48,7 @@ struct Phantom {
   Labels labels;        ///< exact tissue at the voxel centre
   double bone_mm3 = 0;  ///< by the same 27 samples a voxel
 };
-/// Same parameters, same bytes, for any number of threads.
+/// Same parameters and context.seed (of the noise), same bytes, for any number of threads.
 [[nodiscard]] Phantom make_phantom(const PhantomParams& params, const Context& context = {});
 
 struct PhantomStage {
@@ -59,7 +58,6 @@ struct PhantomStage {
     visit({"spacing_mm", "voxel size in the slice", "mm", 0.2, 4}, p.spacing_mm);
     visit({"slice_mm", "distance of slices (0: same as spacing_mm)", "mm", 0, 10}, p.slice_mm);
     visit({"noise_hu", "standard deviation of the noise", "HU", 0, 200}, p.noise_hu);
-    visit({"seed", "of the noise", "", 0, 2147483647}, p.seed);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

@@ -1,6 +1,7 @@
 // A graph of stages: from a file or from a command line, checked as a whole before anything is read, then run.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -33,6 +34,7 @@ struct Pipeline {
 struct PipelineVariable {
   std::string name, help;
   std::optional<std::string> fallback;
+  bool in_file_name = false;  ///< part of the name of a file that is read: its value may name a patient
 };
 
 /// Reads a pipeline file:
@@ -52,6 +54,8 @@ void validate(Pipeline& pipeline, const Registry& registry);
 struct RunOptions {
   bool overwrite = false;  ///< replace outputs that exist
   bool reuse = false;      ///< keep outputs that exist and would come out the same; make the others again
+  /// Where an output is written before the caller moves it to its place, once all are made. Empty: straight to its place.
+  std::function<std::filesystem::path(const std::filesystem::path& output)> place = {};
 };
 
 struct NodeResult {
@@ -66,10 +70,19 @@ struct NodeResult {
 
 /// Validates and runs. Beside each output FILE it writes FILE.prov.json: program, stage, parameters, hashes of inputs and
 /// output, report, duration, peak memory. No names of inputs, since names of files may name patients.
-/// An error names the stage; outputs finished before stay.
+/// An error names the stage; outputs finished before stay. A folder is replaced only when require_replaceable lets it pass.
 std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context);
 
+/// Throws Error(cannot_write), with names, unless every file in `folder` is as the record beside `output` says: what the program has not
+/// made, or what was changed since, is never replaced. (`output` may be a link to the folder.)
+void require_replaceable(const std::filesystem::path& folder, const std::filesystem::path& output);
+/// The text, or "(UID)" for a DICOM UID, which names a scan of a patient and must not reach a record.
+[[nodiscard]] std::string without_uid(const std::string& text);
+/// "a, b, c, d, e and 12 more"
+[[nodiscard]] std::string list_names(const std::vector<std::string>& names);
+
 [[nodiscard]] std::filesystem::path provenance_path(const std::filesystem::path& output);
+/// "0.1.0 (commit c8d6ef5d1b2a)", with ", changed" where the sources differed from it, or "(unknown commit)" without git.
 [[nodiscard]] std::string_view program_version();
 
 }  // namespace osteo

@@ -4,9 +4,11 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "osteo/data/sparse_grid.h"
 #include "osteo/pipeline/pipeline.h"
+#include "osteo/scene/recipe.h"
 
 namespace osteo {
 
@@ -16,8 +18,38 @@ struct Case {
   SparseGrid bone;
 };
 
-/// Writes manifest.json: units, frame, what made each file, hashes; nothing that identifies the patient.
-void write_manifest(const std::filesystem::path& folder, const std::string& pipeline_name, const std::vector<NodeResult>& results);
+/// The next state of a case. Until commit() the case stays as it was, whatever happens; from then on it is the new one, also when the
+/// program is stopped half-way: who opens the case next finishes what is left (renames).
+class CaseUpdate {
+ public:
+  /// Makes the folder when it is missing, finishes an earlier commit, and keeps others from preparing into it. Error(cannot_write).
+  explicit CaseUpdate(std::filesystem::path folder);
+  /// Without commit: nothing is left, not even the folder when it was made for this.
+  ~CaseUpdate();
+  CaseUpdate(const CaseUpdate&) = delete;
+  CaseUpdate& operator=(const CaseUpdate&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// Where an output of the case is written before commit(). What does not lie in the case's folder itself is written where it belongs.
+  [[nodiscard]] std::filesystem::path place(const std::filesystem::path& output) const;
+  /// `manifest`: the text of manifest.json. Files that only the old manifest names go, unless they were changed since. A case that would
+  /// come out the same is not touched.
+  void commit(const std::string& manifest);
+
+ private:
+  std::filesystem::path folder_, staging_;
+  bool is_new_;
+  int lock_ = -1;
+};
+
+/// Names of what lies in the folder and is no part of a case; of a case, what `outputs` would replace without having made it.
+[[nodiscard]] std::vector<std::string> foreign_files(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& outputs);
+
+/// The text of manifest.json: units, frame, what made each file, hashes, recipe; nothing that identifies the patient.
+[[nodiscard]] std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_name, const std::vector<NodeResult>& results,
+                                        const Recipe& recipe);
+/// Fills in the reports of steps that were not done again, from the manifest that is there, where their keys agree.
+void recall_facts(const std::filesystem::path& folder, std::vector<NodeResult>& results);
 
 struct ManifestFile {
   std::string name;  ///< in the case's folder
@@ -26,7 +58,7 @@ struct ManifestFile {
 /// Role -> file. Error(corrupt) for what is no manifest, names no bone, or names a file outside the case.
 [[nodiscard]] std::map<std::string, ManifestFile> parse_manifest(std::string_view json);
 
-/// Reads the manifest, checks that the files are there and unchanged, loads the bone. Errors: no_input, corrupt.
+/// Finishes an interrupted commit, reads the manifest, checks that the files are there and unchanged, loads the bone. Errors: no_input, corrupt.
 [[nodiscard]] Case load_case(const std::filesystem::path& folder);
 
 }  // namespace osteo

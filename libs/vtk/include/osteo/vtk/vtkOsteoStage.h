@@ -1,7 +1,8 @@
 /// @class vtkOsteoStage
 /// Any Osteotome stage as a VTK filter. Images, masks and surfaces are VTK's own data sets, without copies of voxels; sparse
 /// grids and pictures travel as vtkOsteoDataObject. Progress and abort are VTK's; a failure sets the error code, is told by
-/// vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again.
+/// vtkErrorMacro, and keeps the filter modified, so that the next Update() tries again. A stage that makes an image does its work in
+/// UpdateInformation(), since only then its extent is known; Update() hands over the same result.
 ///
 /// @code
 /// vtkNew<vtkOsteoStage> threshold;
@@ -14,6 +15,7 @@
 
 #include <vtkAlgorithm.h>
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,6 +37,8 @@ class vtkOsteoStage : public vtkAlgorithm {
   std::string GetParameter(const std::string& name);
   /// For stages that read a file or folder themselves (import).
   void SetSourcePath(const std::string& path);
+  /// For one input of a stage that reads several (curve).
+  void SetSourcePath(const std::string& input, const std::string& path);
 
   /// Index of the VTK port of a stage's input or output; -1 when there is none.
   int GetInputPortIndex(const std::string& name) const;
@@ -66,6 +70,7 @@ class vtkOsteoStage : public vtkAlgorithm {
   std::unique_ptr<osteo::Stage> Stage;
   std::vector<int> StageInputOfPort;  // VTK input port -> input of the stage (file inputs have no VTK port)
   std::string SourcePath;
+  std::map<std::string, std::string> SourcePaths;
   std::vector<osteo::Data> Results;  // of a run done ahead, when its output's extent had to be known
   vtkMTimeType ResultsTime = 0;
   bool Failed = false;

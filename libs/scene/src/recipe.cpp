@@ -1,0 +1,138 @@
+#include "osteo/scene/recipe.h"
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+
+namespace osteo {
+namespace {
+
+using nlohmann::ordered_json;
+
+// Where notes are kept; empty without a home.
+fs::path notes_folder() {
+  if (const char* state = std::getenv("XDG_STATE_HOME"); state != nullptr && *state == '/') return fs::path(state) / "osteotome";
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/') return fs::path(home) / ".local/state/osteotome";
+  return {};
+}
+
+}  // namespace
+
+void remember(const std::string& hash, const std::string& text) {
+  const fs::path folder = notes_folder();
+  if (folder.empty() || hash.empty() || recall(hash) == text) return;
+  try {
+    if (!output_exists(folder)) {
+      make_output_folder(folder);
+      fs::permissions(folder, fs::perms::owner_all);
+    }
+    write_file(folder / hash, text);
+  } catch (const std::exception&) {
+    // It is a convenience: without it the scan has to be named again, and prepare says so.
+  }
+}
+
+std::optional<std::string> recall(const std::string& hash) {
+  const fs::path folder = notes_folder();
+  if (folder.empty() || hash.empty() || hash.find('/') != std::string::npos) return std::nullopt;
+  try {
+    return read_text(folder / hash);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<fs::path> recall_file(const std::string& hash) {
+  const auto text = recall(hash);
+  try {
+    if (text && hash_path(*text) == hash) return *text;
+  } catch (const Error&) {
+    // Gone, or not to be read any more.
+  }
+  return std::nullopt;
+}
+
+std::string recipe_json(const Recipe& r) {
+  ordered_json j{{"source_hash", r.source_hash}};
+  if (!r.structures_hash.empty()) j["structures_hash"] = r.structures_hash;
+  if (!r.pipeline_hash.empty()) j["pipeline_hash"] = r.pipeline_hash;
+  j["settings"] = ordered_json::object();
+  for (const auto& [name, value] : r.settings) {
+    if (r.withheld.contains(name)) {
+      j["withheld"][name] = hash_text(value);
+    } else {
+      j["settings"][name] = value;
+    }
+  }
+  return j.dump();
+}
+
+std::optional<Recipe> read_recipe(const fs::path& case_folder) {
+  const fs::path file = case_folder / "manifest.json";
+  if (!output_exists(file)) return std::nullopt;
+  try {
+    const auto m = ordered_json::parse(read_text(file));
+    if (!m.contains("recipe")) return std::nullopt;
+    const auto& j = m.at("recipe");
+    Recipe r;
+    r.source_hash = j.at("source_hash").get<std::string>();
+    r.structures_hash = j.value("structures_hash", "");
+    r.pipeline_hash = j.value("pipeline_hash", "");
+    for (const auto& [name, value] : j.at("settings").items()) r.settings[name] = value.get<std::string>();
+    const auto withheld = j.value("withheld", ordered_json::object());
+    for (const auto& [name, hash] : withheld.items()) {
+      if (const auto value = recall(hash.get<std::string>())) {
+        r.settings[name] = *value;
+        r.withheld.insert(name);
+      } else {
+        r.lost.insert(name);
+      }
+    }
+    return r;
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + e.what(), "make the case anew, with --fresh and all its flags");
+  }
+}
+
+std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string, std::optional<std::string>>& given, bool other_structures) {
+  std::vector<RecipeChange> changes;
+  const auto set = [&](const std::string& name, const std::optional<std::string>& to, const std::string& why) {
+    const auto it = r.settings.find(name);
+    std::optional<std::string> from;
+    if (it != r.settings.end()) from = it->second;
+    r.lost.erase(name);
+    if (from == to) return;
+    changes.push_back({name, from, to, why});
+    r.withheld.erase(name);
+    if (to) {
+      r.settings[name] = *to;
+    } else {
+      r.settings.erase(it);
+    }
+  };
+  const auto differs = [&](const char* name) {
+    const auto now = given.find(name);
+    if (now == given.end()) return false;
+    const auto before = r.settings.find(name);
+    return before == r.settings.end() ? now->second.has_value() : now->second != before->second;
+  };
+  // Decided before anything changes; what is given itself stays.
+  std::vector<std::pair<std::string, std::string>> dropped;
+  if (differs("region")) {
+    for (const char* name : {"centre_mm", "size_mm"}) dropped.emplace_back(name, "it belonged to the region");
+  }
+  if (other_structures) dropped.emplace_back("names", "they belonged to the other label map");
+  const auto preset = given.find("preset");
+  if (preset != given.end() && preset->second && *preset->second != "fixed") dropped.emplace_back("lower", "the preset finds the threshold");
+  if (given.contains("lower") && given.at("lower")) dropped.emplace_back("preset", "it would not use --lower");
+  for (const auto& [name, value] : given) set(name, value, "");
+  for (const auto& [name, why] : dropped) {
+    const auto it = r.settings.find(name);
+    if (!given.contains(name) && it != r.settings.end() && !(name == "preset" && it->second == "fixed")) set(name, std::nullopt, why);
+  }
+  return changes;
+}
+
+}  // namespace osteo

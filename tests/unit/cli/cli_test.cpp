@@ -1,0 +1,192 @@
+// The command line around toy commands: flags, exit codes, what goes to standard output; and the rules that all of osteo's own keep.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/cli/command.h"
+#include "osteo/cli/report.h"
+#include "osteo/pipeline/pipeline.h"
+#include "stages.h"
+
+namespace osteo {
+namespace {
+
+struct FailStage {
+  struct Params {
+    std::string how = "verdict";
+    int times = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"how", "it fails"}, p.how);
+    visit({"times", "so often", "", 0, 9}, p.times);
+  }
+  static StageInfo info() {
+    return {.name = "fail",
+            .synopsis = "fails",
+            .description = "Fails.",
+            .inputs = {},
+            .outputs = {{"document", {DataKind::document}, "nothing"}, {"verdict", {DataKind::document}, "why", true, ".verdict.json"}},
+            .references = {},
+            .example = "osteo fail x.json"};
+  }
+  static std::vector<Data> run(const Params& p, std::span<const Data>, const Context&) {
+    if (p.how == "verdict") throw ErrorWithDocument(Error(ExitCode::corrupt, "not taken", "look"), "verdict", {R"({"status": "refused"})"});
+    if (p.how == "permission") throw fs::filesystem_error("status", "/nowhere/x", std::make_error_code(std::errc::permission_denied));
+    if (p.how == "memory") throw std::bad_alloc();
+    if (p.how == "defect") throw std::logic_error("odd");
+    return {Document{"{}"}, Document{"{}"}};
+  }
+};
+
+struct EchoCommand {
+  struct Params {
+    std::string text = "abc";
+    bool on = true;
+    double size = 2;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"text", "a text"}, p.text);
+    visit({"on", "a flag"}, p.on);
+    visit({"size", "a number", "mm", 0, 5}, p.size);
+  }
+  static cli::CommandInfo info() { return {"echo", "says", "Says.", {{"what", "to say", true}}, "osteo echo"}; }
+  static int run(const Params& p, cli::Invocation& io) {
+    nlohmann::json j{{"text", p.text}, {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments}, {"seed", io.context.seed}};
+    for (const auto& [k, v] : io.settings) j["settings"][k] = v;
+    io.out << j.dump();
+    return 0;
+  }
+};
+
+struct Said {
+  int code = 0;
+  std::string out, err;
+  [[nodiscard]] nlohmann::json json() const { return nlohmann::json::parse(out); }
+};
+
+Said run(std::vector<std::string> args) {
+  cli::Program program;
+  program.registry.add<FailStage>();
+  program.add<EchoCommand>();
+  args.insert(args.begin(), "osteo");
+  std::vector<char*> argv;
+  for (auto& a : args) argv.push_back(a.data());
+  std::ostringstream out, err;
+  Said said;
+  said.code = cli::run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
+  said.out = out.str();
+  said.err = err.str();
+  return said;
+}
+
+TEST(Cli, FlagsReachTheCommandAndItKnowsWhichWereGiven) {
+  const auto j = run({"echo", "hello", "--size=3", "--no-on", "--set", "a=b=c", "--seed", "7"}).json();
+  EXPECT_EQ(j["size"], 3);
+  EXPECT_EQ(j["on"], false);
+  EXPECT_EQ(j["text"], "abc");
+  EXPECT_EQ(j["settings"]["a"], "b=c");
+  EXPECT_EQ(j["seed"], 7);
+  EXPECT_EQ(j["given"], (nlohmann::json{"on", "seed", "size"}));
+  EXPECT_EQ(run({"echo", "--size", "2"}).json()["given"], nlohmann::json{"size"});  // also when it is the default
+  EXPECT_EQ(run({"echo", "--no-text"}).json()["text"], "");
+  EXPECT_EQ(run({"echo", "--", "--size"}).json()["arguments"], nlohmann::json{"--size"});
+}
+
+TEST(Cli, MistakesAreUsageAndNameTheRightWord) {
+  for (const auto& [args, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{{{"echo", "--sise", "1"}, "did you mean --size?"},
+                                                                                               {{"echo", "--size", "9"}, "between 0 mm and 5 mm"},
+                                                                                               {{"echo", "--size"}, "needs a value"},
+                                                                                               {{"echo", "--no-size"}, "no flag --no-size"},
+                                                                                               {{"echo", "a", "b"}, "takes [what]"},
+                                                                                               {{"ecko"}, "did you mean 'echo'?"},
+                                                                                               {{"fail"}, "takes <document.out> (1 name), but none was given"},
+                                                                                               {{"fail", "a", "b"}, "(1 name), but 2 were given"}}) {
+    const Said said = run(args);
+    EXPECT_EQ(said.code, 2) << text;
+    EXPECT_NE(said.err.find(text), std::string::npos) << said.err;
+    EXPECT_TRUE(said.out.empty());
+  }
+}
+
+TEST(Cli, FailureIsJsonOnStandardOutputWithWhatWasFound) {
+  const TemporaryFolder at;
+  const std::string out = (at.path() / "x.json").string();
+  const Said said = run({"fail", out, "--json"});
+  EXPECT_EQ(said.code, 4);
+  EXPECT_EQ(said.json()["error"]["exit_code"], 4);
+  EXPECT_EQ(said.json()["error"]["name"], "corrupt");
+  EXPECT_EQ(said.json()["error"]["message"], "not taken");
+  EXPECT_EQ(said.json()["error"]["advice"], "look");
+  EXPECT_EQ(said.json()["verdict"]["status"], "refused");
+  EXPECT_TRUE(fs::exists(at.path() / "x.json.verdict.json"));
+  EXPECT_TRUE(run({"fail", out}).out.empty());
+  EXPECT_EQ(run({"echo", "--json", "--size", "9"}).json()["error"]["exit_code"], 2);
+}
+
+TEST(Cli, WhatTheLibraryThrowsHasACodeToo) {
+  const TemporaryFolder at;
+  const std::string out = (at.path() / "x.json").string();
+  EXPECT_EQ(run({"fail", out, "--how", "permission"}).code, 6);
+  EXPECT_EQ(run({"fail", out, "--how", "memory"}).code, 9);
+  const Said defect = run({"fail", out, "--how", "defect"});
+  EXPECT_EQ(defect.code, 1);
+  EXPECT_NE(defect.err.find("please report it"), std::string::npos);
+}
+
+TEST(Cli, VersionNamesTheCommit) {
+  const Said said = run({"--version"});
+  EXPECT_EQ(said.code, 0);
+  EXPECT_TRUE(said.out.starts_with("osteo " + std::string(program_version()) + "\n")) << said.out;
+}
+
+TEST(Cli, FactsAreForPeople) {
+  using P = std::pair<std::string, std::string>;
+  EXPECT_EQ(cli::fact_text("mask_volume_mm3", 511409.3), (P{"mask volume", "511409 mm3"}));
+  EXPECT_EQ(cli::fact_text("marching_cubes_distance_max_voxels", 0.17), (P{"marching cubes distance", "0.17 voxels, the most"}));
+  EXPECT_EQ(cli::fact_text("facial nerve mm3", 12.5), (P{"facial nerve", "12.5 mm3"}));
+  EXPECT_EQ(cli::fact_text("pieces", std::int64_t{36}), (P{"pieces", "36"}));
+  EXPECT_EQ(cli::fact_text("watertight", true), (P{"watertight", "yes"}));
+  EXPECT_EQ(cli::fact_text("hu", std::int64_t{3}), (P{"hu", "3"}));
+}
+
+// A stage's own --seed once hid the common one.
+TEST(AllStages, NoFlagHidesACommonOne) {
+  cli::Common::Params common;
+  std::set<std::string> taken{"xml", "describe", "help", "set"};
+  for (const auto& f : fields_of<cli::Common>(common)) taken.emplace(f.doc.name);
+  const Registry registry = osteo_stages();
+  for (const auto& name : registry.names()) {
+    const auto stage = registry.make(name);
+    std::set<std::string> own;
+    for (const auto& f : stage->fields()) {
+      EXPECT_FALSE(taken.contains(std::string(f.doc.name))) << name << " --" << f.doc.name;
+      EXPECT_TRUE(own.emplace(f.doc.name).second) << name << " has --" << f.doc.name << " twice";
+    }
+    for (const Port& p : stage->info().inputs) EXPECT_FALSE(own.contains(p.name)) << name << " " << p.name;
+  }
+}
+
+TEST(AllStages, SeedOfTheCommandLineIsTheSeedOfTheResult) {
+  cli::Program program;
+  program.registry = osteo_stages();
+  const TemporaryFolder at;
+  std::vector<std::string> hashes;
+  for (const char* seed : {"1", "2"}) {
+    const fs::path out = at.path() / (std::string(seed) + ".nrrd");
+    std::vector<std::string> args{"osteo", "phantom", out.string(), "--region", "temporal", "--spacing-mm", "4", "--seed", seed, "--quiet"};
+    std::vector<char*> argv;
+    for (auto& a : args) argv.push_back(a.data());
+    std::ostringstream said, err;
+    ASSERT_EQ(cli::run_program(program, static_cast<int>(argv.size()), argv.data(), said, err), 0) << err.str();
+    const auto p = nlohmann::json::parse(read_text(provenance_path(out)));
+    EXPECT_EQ(p["seed"], std::stoi(seed));
+    hashes.push_back(p["output_hash"]);
+  }
+  EXPECT_NE(hashes[0], hashes[1]);
+}
+
+}  // namespace
+}  // namespace osteo

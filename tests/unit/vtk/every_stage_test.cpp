@@ -1,0 +1,286 @@
+// Every stage of osteo as a VTK filter: fed through VTK's own data sets it must give what the stage gives by itself, bit for bit, and its
+// images must be what their information announces. A new stage is tried by itself, with inputs of the first kind that its ports take; one
+// that needs parameters, a document or a file has a line in the table.
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <vtkExecutive.h>
+#include <vtkImageData.h>
+#include <vtkImageThreshold.h>
+#include <vtkInformation.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkSphereSource.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkTrivialProducer.h>
+#include <vtkUnstructuredGrid.h>
+
+#include <fstream>
+
+#include "osteo/base/files.h"
+#include "osteo/dicom/save_series.h"
+#include "osteo/grid/resample.h"
+#include "osteo/image/phantom.h"
+#include "osteo/image/threshold.h"
+#include "osteo/io/vtk_data.h"
+#include "osteo/meshing/stages.h"
+#include "osteo/tissue/calibrate.h"
+#include "osteo/vtk/vtkOsteoDataObject.h"
+#include "osteo/vtk/vtkOsteoStage.h"
+#include "stages.h"
+
+namespace osteo {
+namespace {
+
+struct Recipe {
+  std::map<std::string, std::string> params;
+  std::map<std::string, std::string> texts;  // port -> a document, or the content of a file that it reads
+  std::vector<std::string> also;             // optional inputs that are connected too
+  std::vector<std::string> untimed = {};     // outputs that hold durations: only that they are there
+};
+
+constexpr const char* kProblem = R"({"osteotome_tissue": 1, "material": {"young_kpa": 10, "poisson": 0.4},
+  "fixed": [{"box_mm": [[-20, -20, -20], [20, 20, -4]]}], "loads": [{"name": "pull", "forces": [{"at_mm": [0, 0, 8], "radius_mm": 8, "total_n": [0, 0, 0.1]}]}]})";
+
+const std::map<std::string, Recipe>& table() {
+  static const std::map<std::string, Recipe> value{
+      {"import-bone", {{{"lower", "500"}, {"spacing_mm", "2"}}, {}, {}}},
+      {"crop", {{{"region", "box"}, {"centre_mm", "60,20,-20"}, {"size_mm", "30,24,20"}}, {}, {"labels"}}},
+      {"threshold", {{{"lower", "500"}}, {}, {}}},
+      {"resample", {{{"lower", "500"}, {"spacing_mm", "2"}}, {}, {"mask"}}},
+      {"distance", {{{"resolution", "16"}}, {}, {}}},
+      {"distance-at", {{}, {{"points", "0 0 0\n12 0 0\n"}}, {}}},
+      {"voxelize", {{{"resolution", "20"}}, {}, {}}},
+      {"tetrahedralize", {{{"method", "grid"}, {"spacing_mm", "4"}}, {}, {}}},
+      {"fem", {{}, {{"problem", kProblem}}, {}, {"report"}}},
+      {"calibrate", {{}, {{"problem", kProblem}}, {}, {"constants"}}},
+      {"simulate", {{{"seconds", "0.02"}}, {{"problem", kProblem}}, {}, {"report"}}},
+      {"saw", {{{"normal", "0,0,1"}}, {}, {}}},
+      {"curve", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
+      {"phantom", {{{"region", "temporal"}, {"spacing_mm", "4"}}, {}, {}}},
+  };
+  return value;
+}
+
+// One value of each kind, as it comes out of VTK.
+struct Values {
+  TemporaryFolder files;
+  Image image;
+  Labels labels;
+  SparseGrid grid;
+  Surface surface;
+  Tets tets;
+  fs::path dicom = files.path() / "dicom";
+
+  Values() {
+    PhantomParams p;
+    p.region = PhantomRegion::temporal;
+    p.spacing_mm = 2;
+    const Phantom phantom = make_phantom(p);
+    image = image_from_vtk(to_vtk(phantom.ct));
+    labels = labels_from_vtk(to_vtk(phantom.labels));
+    ThresholdParams t;
+    t.lower = 500;
+    ResampleParams r;
+    r.lower = 500;
+    r.spacing_mm = 2;
+    grid = resample_bone(image, threshold(image, t), r).density;
+    save_dicom_series(image, dicom);
+    vtkNew<vtkSphereSource> sphere;
+    sphere->SetRadius(10);
+    sphere->SetThetaResolution(24);
+    sphere->SetPhiResolution(16);
+    sphere->Update();
+    surface = std::make_shared<const TriMesh>(mesh_from_vtk(sphere->GetOutput()));
+    const auto stage = osteo_stages().make("tetrahedralize");
+    for (const auto& f : stage->fields()) {
+      if (const auto it = table().at("tetrahedralize").params.find(std::string(f.doc.name)); it != table().at("tetrahedralize").params.end())
+        f.from_text(it->second);
+    }
+    tets = std::get<Tets>(stage->run(std::vector<Data>{surface}, {})[0]);
+  }
+  [[nodiscard]] Data of(DataKind kind, const std::string& text) const {
+    switch (kind) {
+      case DataKind::image:
+        return image;
+      case DataKind::labels:
+        return labels;
+      case DataKind::grid:
+        return grid;
+      case DataKind::surface:
+        return surface;
+      case DataKind::tets:
+        return tets;
+      case DataKind::document:
+        return Document{text};
+      case DataKind::picture:
+        return Picture{1, 1, {0, 0, 0}};
+      case DataKind::source:
+      case DataKind::none:
+        break;
+    }
+    return std::monostate{};
+  }
+  [[nodiscard]] fs::path file(const std::string& stage, const std::string& port, const std::string& text) const {
+    if (text.empty()) return dicom;
+    const fs::path path = files.path() / (stage + "-" + port + ".txt");
+    std::ofstream(path) << text;
+    return path;
+  }
+};
+
+const Values& values() {
+  static const Values v;
+  return v;
+}
+
+vtkSmartPointer<vtkDataObject> as_vtk(const Data& data) {
+  if (const auto* i = std::get_if<Image>(&data)) return to_vtk(*i);
+  if (const auto* l = std::get_if<Labels>(&data)) return to_vtk(*l);
+  if (const auto* s = std::get_if<Surface>(&data)) return to_vtk(**s);
+  if (const auto* t = std::get_if<Tets>(&data)) return to_vtk(**t);
+  auto own = vtkSmartPointer<vtkOsteoDataObject>::New();
+  own->SetValue(data);
+  return own;
+}
+
+void expect_equal(const Data& wanted, vtkDataObject* object) {
+  ASSERT_NE(object, nullptr);
+  if (const auto* image = std::get_if<Image>(&wanted)) {
+    const Image got = image_from_vtk(vtkImageData::SafeDownCast(object));
+    EXPECT_TRUE(same_place(got.frame, image->frame, 1e-9));
+    EXPECT_TRUE(std::ranges::equal(got.span(), image->span()));
+  } else if (const auto* labels = std::get_if<Labels>(&wanted)) {
+    const Labels got = labels_from_vtk(vtkImageData::SafeDownCast(object));
+    EXPECT_TRUE(same_place(got.frame, labels->frame, 1e-9));
+    EXPECT_TRUE(std::ranges::equal(got.span(), labels->span()));
+  } else if (const auto* surface = std::get_if<Surface>(&wanted)) {
+    const TriMesh got = mesh_from_vtk(vtkPolyData::SafeDownCast(object));
+    EXPECT_EQ(got.points_mm, (*surface)->points_mm);
+    EXPECT_EQ(got.triangles, (*surface)->triangles);
+  } else if (const auto* tets = std::get_if<Tets>(&wanted)) {
+    const TetMesh got = tets_from_vtk(vtkUnstructuredGrid::SafeDownCast(object));
+    EXPECT_TRUE(std::ranges::equal(got.points_mm, (*tets)->points_mm));
+    EXPECT_TRUE(std::ranges::equal(got.tets, (*tets)->tets));
+  } else if (std::holds_alternative<std::monostate>(wanted)) {
+    if (auto* const empty = vtkImageData::SafeDownCast(object)) EXPECT_EQ(empty->GetNumberOfPoints(), 0);
+  } else {
+    auto* const own = vtkOsteoDataObject::SafeDownCast(object);
+    ASSERT_NE(own, nullptr);
+    ASSERT_EQ(kind_of(own->GetValue()), kind_of(wanted));
+    if (const auto* grid = std::get_if<SparseGrid>(&wanted)) {
+      const auto& got = std::get<SparseGrid>(own->GetValue());
+      EXPECT_EQ(got.frame, grid->frame);
+      EXPECT_EQ(got.active_voxels, grid->active_voxels);
+    }
+    if (const auto* d = std::get_if<Document>(&wanted)) EXPECT_EQ(std::get<Document>(own->GetValue()).json, d->json);
+    if (const auto* p = std::get_if<Picture>(&wanted)) EXPECT_EQ(std::get<Picture>(own->GetValue()).rgb, p->rgb);
+  }
+}
+
+void expect_announced(vtkOsteoStage* stage, int port) {
+  auto* const image = vtkImageData::SafeDownCast(stage->GetOutputDataObject(port));
+  if (image == nullptr || image->GetNumberOfPoints() == 0) return;
+  int announced[6], extent[6];
+  double spacing[3], origin[3];
+  vtkInformation* const info = stage->GetOutputInformation(port);
+  info->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), announced);
+  info->Get(vtkDataObject::SPACING(), spacing);
+  info->Get(vtkDataObject::ORIGIN(), origin);
+  image->GetExtent(extent);
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(announced[i], extent[i]);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(spacing[i], image->GetSpacing()[i]);
+    EXPECT_EQ(origin[i], image->GetOrigin()[i]);
+  }
+  // What VTK's own filter makes of it covers all of it.
+  vtkNew<vtkImageThreshold> next;
+  next->SetInputConnection(stage->GetOutputPort(port));
+  next->ThresholdByUpper(1);
+  next->Update();
+  EXPECT_EQ(next->GetOutput()->GetNumberOfPoints(), image->GetNumberOfPoints());
+}
+
+class EveryStage : public testing::TestWithParam<std::string> {};
+
+TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
+  if (GetParam() == "calibrate" && !has_ceres()) GTEST_SKIP() << "built without Ceres";
+  const Registry registry = osteo_stages();
+  const auto line = table().find(GetParam());
+  const Recipe recipe = line == table().end() ? Recipe{} : line->second;
+  const auto plain = registry.make(GetParam());
+  vtkNew<vtkOsteoStage> filter;
+  ASSERT_TRUE(filter->SetStage(registry, GetParam()));
+  for (const auto& [name, text] : recipe.params) {
+    ASSERT_TRUE(filter->SetParameter(name, text)) << filter->GetLastError();
+    for (const auto& f : plain->fields()) {
+      if (f.doc.name == name) f.from_text(text);
+    }
+  }
+  std::vector<Data> inputs;
+  for (const Port& port : plain->info().inputs) {
+    inputs.emplace_back();
+    if (port.optional && std::find(recipe.also.begin(), recipe.also.end(), port.name) == recipe.also.end()) continue;
+    const auto text = recipe.texts.find(port.name);
+    if (port.kinds.front() == DataKind::source) {
+      const fs::path path = values().file(GetParam(), port.name, text == recipe.texts.end() ? "" : text->second);
+      inputs.back() = Source{path};
+      filter->SetSourcePath(port.name, path.string());
+      continue;
+    }
+    inputs.back() = values().of(port.kinds.front(), text == recipe.texts.end() ? "" : text->second);
+    vtkNew<vtkTrivialProducer> producer;
+    producer->SetOutput(as_vtk(inputs.back()));
+    filter->SetInputConnection(filter->GetInputPortIndex(port.name), producer->GetOutputPort());
+  }
+  const std::vector<Data> wanted = plain->run(inputs, {});
+  for (int again = 0; again < 2; ++again) {
+    ASSERT_EQ(filter->GetExecutive()->Update(0), 1) << filter->GetLastError();
+    ASSERT_EQ(filter->GetErrorCode(), 0UL) << filter->GetLastError();
+    for (std::size_t p = 0; p < wanted.size(); ++p) {
+      SCOPED_TRACE(plain->info().outputs[p].name);
+      const auto& untimed = recipe.untimed;
+      if (std::find(untimed.begin(), untimed.end(), plain->info().outputs[p].name) == untimed.end())
+        expect_equal(wanted[p], filter->GetOutputDataObject(static_cast<int>(p)));
+      expect_announced(filter, static_cast<int>(p));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, EveryStage, testing::ValuesIn(osteo_stages().names()), [](const auto& info) {
+  std::string name = info.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+TEST(EveryStage, TableNamesNoStageThatIsGone) {
+  for (const auto& [name, recipe] : table()) EXPECT_TRUE(osteo_stages().has(name)) << name;
+}
+
+// Crop announces another lattice each time its box changes, and without labels its second output stays empty.
+TEST(CropFilter, FollowsItsParametersAndItsInputs) {
+  const Registry registry = osteo_stages();
+  vtkNew<vtkOsteoStage> phantom, crop, mask;
+  ASSERT_TRUE(phantom->SetStage(registry, "phantom"));
+  ASSERT_TRUE(phantom->SetParameter("region", "temporal") && phantom->SetParameter("spacing_mm", "4"));
+  ASSERT_TRUE(crop->SetStage(registry, "crop"));
+  ASSERT_TRUE(crop->SetParameter("region", "box") && crop->SetParameter("centre_mm", "60,20,-20") && crop->SetParameter("size_mm", "30,30,30"));
+  crop->SetInputConnection(crop->GetInputPortIndex("image"), phantom->GetOutputPort(0));
+  ASSERT_TRUE(mask->SetStage(registry, "threshold"));
+  ASSERT_TRUE(mask->SetParameter("lower", "300"));
+  mask->SetInputConnection(crop->GetOutputPort(0));
+  const auto points = [&] {
+    EXPECT_EQ(mask->GetExecutive()->Update(0), 1) << crop->GetLastError() << mask->GetLastError();
+    return vtkImageData::SafeDownCast(mask->GetOutputDataObject(0))->GetNumberOfPoints();
+  };
+  const auto small = points();
+  EXPECT_LT(small, 1000);
+  ASSERT_TRUE(crop->SetParameter("size_mm", "44,44,44"));
+  const auto large = points();
+  EXPECT_GT(large, 2 * small);
+  ASSERT_TRUE(phantom->SetParameter("spacing_mm", "3"));
+  EXPECT_GT(points(), 2 * large);
+  EXPECT_EQ(vtkImageData::SafeDownCast(crop->GetOutputDataObject(1))->GetNumberOfPoints(), 0);
+}
+
+}  // namespace
+}  // namespace osteo
