@@ -3,6 +3,7 @@
 set -euo pipefail
 bin=$1 out=$2
 rm -rf "$out" && mkdir -p "$out" && cd "$out"
+export XDG_STATE_HOME=$out/state
 "$bin/osteo" phantom ct.nrrd --labels-out labels.nrrd --region temporal --spacing-mm 1.5 --quiet
 "$bin/osteo" import ct.nrrd dicom --quiet
 "$bin/osteo" threshold ct.nrrd mask.nrrd --lower 500 --quiet

@@ -6,6 +6,7 @@
 #   value FILE key                 a top-level key of a JSON file
 #   soon command...                waits until the command succeeds, a minute at most
 #   holds FILE bytes               the file is at least that long
+#   nobody command...              as a user without rights; exits the case with 77 (skipped) where that cannot be tried
 #   hears_interrupt PID            the process has its handler for SIGINT (bit 2 of the signals that it catches)
 set -euo pipefail
 file=$1 name=$2 bin=$3 fixtures=$4 source=$5
@@ -13,7 +14,8 @@ PATH=$bin:$PATH
 line=$(grep -E "^$name *\|" "$file" | head -n 1)
 [ -n "$line" ] || { echo "no case '$name' in $file"; exit 1; }
 work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-case-XXXXXX")
-trap 'chmod -R u+rwx "$work" 2>/dev/null; rm -rf "$work"' EXIT
+trap 'chmod -R u+rwx "$work" 2>/dev/null; rm -rf "$work" "$work.state"' EXIT
+export XDG_STATE_HOME=$work.state # what prepare remembers of this user's files
 cd "$work"
 fails() {
   local code=$1 text=$2 got=0
@@ -31,6 +33,11 @@ soon() {
   return 1
 }
 holds() { [ "$(stat -c %s "$1" 2>/dev/null || echo 0)" -ge "$2" ]; }
+nobody() {
+  [ "$(id -u)" -eq 0 ] || { "$@"; return; }
+  chmod a+rx . && setpriv --reuid=65534 --regid=65534 --clear-groups test -x "$(command -v osteo)" || exit 77
+  setpriv --reuid=65534 --regid=65534 --clear-groups "$@"
+}
 hears_interrupt() { grep -qE '^SigCgt:.*[2367abef]$' "/proc/$1/status"; }
-export -f fails same value soon holds hears_interrupt; export fixtures PATH
+export -f fails same value soon holds nobody hears_interrupt; export fixtures PATH
 eval "${line#*|}"
