@@ -90,7 +90,12 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   };
 
   // What the case remembers, and whether it is the same scan.
-  std::optional<Recipe> before = read_recipe(folder);
+  std::optional<Recipe> before;
+  try {
+    before = read_recipe(folder);
+  } catch (const Error&) {
+    if (!p.fresh) throw;  // a damaged manifest: what it remembered is lost
+  }
   const bool is_case = output_exists(folder / "manifest.json");
   if (is_case && !before && !p.fresh && foreign_files(folder, {}).empty()) {
     throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version and remembers no flags",

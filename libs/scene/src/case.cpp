@@ -93,8 +93,8 @@ CaseUpdate::CaseUpdate(fs::path folder) : folder_(std::move(folder)), is_new_(!o
     throw Error(ExitCode::cannot_write, "cannot write into '" + folder_.string() + "': " + std::strerror(errno),
                 "choose a folder that you may write to");
   }
-  lock_ = lock_folder(folder_, false);
   try {
+    lock_ = lock_folder(folder_, false);
     settle(folder_);
     // We have the lock: whoever made these is gone.
     std::vector<fs::path> dead;
@@ -105,19 +105,23 @@ CaseUpdate::CaseUpdate(fs::path folder) : folder_(std::move(folder)), is_new_(!o
     staging_ = folder_ / (kStaging + std::to_string(::getpid()));
     fs::create_directory(staging_);
   } catch (const fs::filesystem_error& e) {
-    if (lock_ >= 0) ::close(lock_);
+    close();
     throw error_of(e);
   } catch (...) {
-    if (lock_ >= 0) ::close(lock_);
+    close();
     throw;
   }
 }
 
-CaseUpdate::~CaseUpdate() {
+void CaseUpdate::close() noexcept {
   std::error_code ignored;
-  fs::remove_all(staging_, ignored);
+  if (!staging_.empty()) fs::remove_all(staging_, ignored);
   if (is_new_) fs::remove(folder_, ignored);  // only when it is empty
   if (lock_ >= 0) ::close(lock_);
+}
+
+CaseUpdate::~CaseUpdate() {
+  close();
 }
 
 fs::path CaseUpdate::place(const fs::path& output) const {
@@ -151,9 +155,11 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
       if (name == kNext || name.starts_with(".osteo-tmp-")) continue;
       // The verdict on a refused scan stands alone, without a record; other outputs lie beside theirs.
       bool made = fs::exists(provenance_path(entry.path()));
-      if (name == "import.json" && !made && entry.is_regular_file()) made = read_text(entry.path()).find("\"osteotome_verdict\"") != std::string::npos;
+      // A damaged manifest is still a case's.
+      if (!made && entry.is_regular_file() && (name == "import.json" || name == "manifest.json"))
+        made = read_text(entry.path()).find(name == "import.json" ? "\"osteotome_verdict\"" : "\"osteotome_case\"") != std::string::npos;
       if (made) ours.insert({name, name + ".prov.json"});
-      is_case = is_case || (made && (name == "bone.vdb" || name == "import.json"));
+      is_case = is_case || (made && (name == "bone.vdb" || name == "import.json" || name == "manifest.json"));
       all.push_back(name);
     }
   } catch (const fs::filesystem_error& e) {

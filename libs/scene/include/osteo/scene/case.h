@@ -37,6 +37,8 @@ class CaseUpdate {
   void commit(const std::string& manifest);
 
  private:
+  void close() noexcept;
+
   std::filesystem::path folder_, staging_;
   bool is_new_;
   int lock_ = -1;
