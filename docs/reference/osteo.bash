@@ -55,14 +55,14 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
-    phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --seed --labels-out" ;;
+    phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
     series) flags="$flags" ;;
     guide) flags="$flags" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
-    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline" ;;
+    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline --fresh" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --show-settings --side --seconds --rate-hz --fast --pieces --dust --resume" ;;

@@ -153,11 +153,11 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
     for (const auto& entry : fs::directory_iterator(folder)) {
       const std::string name = entry.path().filename().string();
       if (name == kNext || name.starts_with(".osteo-tmp-")) continue;
-      // The verdict on a refused scan stands alone, without a record; other outputs lie beside theirs.
+      // Outputs lie beside their records; the verdict on a refused scan, a damaged manifest and the record of a lost output stand alone.
       bool made = fs::exists(provenance_path(entry.path()));
-      // A damaged manifest is still a case's.
-      if (!made && entry.is_regular_file() && (name == "import.json" || name == "manifest.json"))
-        made = read_text(entry.path()).find(name == "import.json" ? "\"osteotome_verdict\"" : "\"osteotome_case\"") != std::string::npos;
+      for (const auto& [ending, word] : {std::pair{"import.json", "\"osteotome_verdict\""}, {"manifest.json", "\"osteotome_case\""}, {".prov.json", "\"output_hash\""}}) {
+        if (!made && name.ends_with(ending) && entry.is_regular_file()) made = read_text(entry.path()).find(word) != std::string::npos;
+      }
       if (made) ours.insert({name, name + ".prov.json"});
       is_case = is_case || (made && (name == "bone.vdb" || name == "import.json" || name == "manifest.json"));
       all.push_back(name);
