@@ -1,4 +1,7 @@
 // demo: the main job from end to end.
+#include <unistd.h>
+
+#include <algorithm>
 #include <ostream>
 
 #include "commands.h"
@@ -28,6 +31,17 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
     io.end_progress();
     if (!io.common.quiet) io.err << "\n== " << text << '\n';
   };
+  // Without a terminal there is no bar: a line for each new activity and each 20 % says what is going on.
+  if (::isatty(2) == 0 && !io.common.quiet && io.common.progress == cli::ProgressStyle::automatic) {
+    io.context.on_progress([&err = io.err, activity = std::string(), fifths = 0](double fraction, std::string_view what) mutable {
+      const int now = static_cast<int>(fraction * 5);
+      if (what == activity && now <= fifths) return;
+      if (what != activity) fifths = 0;
+      activity = what;
+      fifths = std::max(fifths, now);
+      err << "   " << static_cast<int>(fraction * 100) << " %  " << activity << std::endl;
+    });
+  }
   if (phantom && !fs::exists(source)) {
     say("making a CT of a phantom head: " + source.string());
     PhantomParams params;

@@ -8,6 +8,7 @@
 #include <vtkInformationVector.h>
 #include <vtkMatrix3x3.h>
 #include <vtkObjectFactory.h>
+#include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkUnstructuredGrid.h>
@@ -44,6 +45,7 @@ void set_image_information(vtkInformation* info, vtkImageData* image) {
   info->Set(vtkDataObject::SPACING(), image->GetSpacing(), 3);
   info->Set(vtkDataObject::ORIGIN(), image->GetOrigin(), 3);
   info->Set(vtkDataObject::DIRECTION(), image->GetDirectionMatrix()->GetData(), 9);
+  if (image->GetPointData()->GetScalars() != nullptr) vtkDataObject::SetPointDataActiveScalarInfo(info, image->GetScalarType(), 1);
 }
 
 // The value of a VTK data object, as the first kind that the port accepts and the object can be.
