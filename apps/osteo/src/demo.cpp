@@ -35,7 +35,7 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
   if (::isatty(2) == 0 && !io.common.quiet && io.common.progress == cli::ProgressStyle::automatic) {
     io.context.on_progress([&err = io.err, activity = std::string(), fifths = 0](double fraction, std::string_view what) mutable {
       const int now = static_cast<int>(fraction * 5);
-      if (what == activity && now <= fifths) return;
+      if (what.empty() || (what == activity && now <= fifths)) return;
       if (what != activity) fifths = 0;
       activity = what;
       fifths = std::max(fifths, now);
