@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <random>
@@ -144,6 +145,27 @@ TEST(Folders, KilledAtAnyMomentOneOfThemIsWhole) {
     const std::string first = read_text(folder / "0");
     for (int n = 1; n < kFiles; ++n) ASSERT_EQ(read_text(folder / std::to_string(n)), first) << "after kill " << kill;
   }
+}
+
+// The name is there at every moment, as somebody sees who looks all the time.
+TEST(Folders, ExchangeLeavesNoGap) {
+  const TemporaryFolder at;
+  const fs::path folder = at.path() / "d";
+  const auto fill = [](const fs::path& t) { put(t / "x", "x"); };
+  write_folder_atomically(folder, {}, fill);
+  std::atomic<bool> done{false};
+  std::atomic<long> looks{0}, gaps{0};
+  std::thread watcher([&] {
+    while (!done) {
+      gaps += ::access(folder.c_str(), F_OK) == 0 ? 0 : 1;
+      ++looks;
+    }
+  });
+  while (looks == 0) std::this_thread::yield();
+  for (int n = 0; n < 300; ++n) write_folder_atomically(folder, kAny, fill);
+  done = true;
+  watcher.join();
+  EXPECT_EQ(gaps, 0) << "of " << looks << " looks";
 }
 
 TEST(Folders, HashFilesNamesEachAndTellsLinks) {
