@@ -23,8 +23,8 @@ HardnessLaw parse_hardness(std::string_view text, const std::string& name) {
     if (!j.is_object() || j.value("osteotome_hardness", 0) != 1) throw Error(ExitCode::usage, "\"osteotome_hardness\" must be 1");
     const auto fields = fields_of<HardnessLaw>(law);
     for (const auto& [key, value] : j.items()) {
-      const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(std::min(text.find('"' + key + '"'), text.size())), '\n');
-      where = name + ", line " + std::to_string(line + 1);
+      const std::string_view before = text.substr(0, text.find('"' + key + '"'));
+      where = name + ", line " + std::to_string(std::count(before.begin(), before.end(), '\n') + 1);
       if (key == "osteotome_hardness" || (key == "source" && value.is_string())) continue;
       const auto f = std::find_if(fields.begin(), fields.end(), [&](const FieldRef& r) { return r.doc.name == key; });
       if (f == fields.end()) {
