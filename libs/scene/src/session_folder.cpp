@@ -155,7 +155,8 @@ std::string told_hardness(const Anatomy& anatomy) {
   const HardnessLaw& law = anatomy.hardness->law();
   const double half = law.zero_hu + (law.cortical_hu - law.zero_hu) / 2;
   return "bone resists the burr by its HU: " + format_number(law.cortical_hu) + " HU as 1, " + format_number(half) + " HU as " +
-         format_number(std::round(100 * law.at(half)) / 100) + R"(; {"osteotome_haptics": 1, "hardness": false} in --settings turns that off)";
+         format_number(std::round(100 * law.at(half)) / 100) +
+         R"(; {"osteotome_haptics": 1, "hardness": false} in --settings turns that off)";
 }
 
 std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {

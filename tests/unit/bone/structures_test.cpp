@@ -127,7 +127,8 @@ TEST(StructureMap, AgreesWithTheNearestOfAllVoxelFaces) {
       for (int i = 1; i < frame.dims[0]; ++i)
         for (int a = 0; a < 3; ++a) {
           const int x = i - (a == 0 ? 1 : 0), y = j - (a == 1 ? 1 : 0), z = k - (a == 2 ? 1 : 0);
-          if (labels.at(i, j, k) != labels.at(x, y, z)) faces.push_back(frame.world_from_index({(i + x) / 2.0, (j + y) / 2.0, (k + z) / 2.0}));
+          if (labels.at(i, j, k) != labels.at(x, y, z))
+            faces.push_back(frame.world_from_index({(i + x) / 2.0, (j + y) / 2.0, (k + z) / 2.0}));
         }
   const StructureMap map(labels, 4);
   std::mt19937 random(4);

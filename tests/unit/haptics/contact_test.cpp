@@ -418,7 +418,8 @@ TEST(Hardness, FollowsItsLaw) {
     EXPECT_NEAR(law.at(hu), std::clamp(hu / 1500, 0.125, 3.0), 1e-12);
     EXPECT_EQ(law.at(hu), HardnessLaw{}.at(hu));
   }
-  const HardnessLaw other = parse_hardness(R"({"osteotome_hardness": 1, "cortical_hu": 1000, "zero_hu": -100, "exponent": 2, "least": 0.05})", "x");
+  const HardnessLaw other =
+      parse_hardness(R"({"osteotome_hardness": 1, "cortical_hu": 1000, "zero_hu": -100, "exponent": 2, "least": 0.05})", "x");
   EXPECT_NEAR(other.at(450), 0.25, 1e-12);
   EXPECT_EQ(other.at(-100), 0.05);
   auto bone = slab(0.5);
@@ -486,7 +487,8 @@ Layers fed(bool hard, double h, double hz, double mm_s = 1) {
 TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
   constexpr double kNoticed = 0.10;
   const Layers alike = fed(false, 0.5, 1000), hard = fed(true, 0.5, 1000);
-  std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n", alike.cortex_n, alike.cancellous_n,
+  std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n", alike.cortex_n,
+              alike.cancellous_n,
               100 * alike.step(), hard.cortex_n, hard.cancellous_n, 100 * hard.step());
   EXPECT_LT(std::abs(alike.step()), kNoticed / 2);
   EXPECT_GT(hard.step(), 2 * kNoticed);

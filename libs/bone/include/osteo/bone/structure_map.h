@@ -35,7 +35,7 @@ class StructureMap {
   };
   /// The nearest structure. 0.05 us for each that is near.
   [[nodiscard]] Answer at(Vec3 world_mm) const noexcept;
-  /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where it is not empty, gets the same for
+  /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where not empty, gets the same for
   /// every structure in the order of values(), reach_mm() where it is farther. Cost: an at() for each half radius along the tool's axis and
   /// eight more; one for a ball.
   Answer clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each = {}) const noexcept;

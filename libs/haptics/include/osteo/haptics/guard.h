@@ -83,8 +83,8 @@ class Guard {
     Vec3 force_n;
     std::uint32_t flags = 0;
   };
-  /// Whatever comes in, the force that goes out is finite and within the limits of force and rate. What is not finite counts as none: force,
-  /// normal; a position, as a jump; an age, as stale; a `dt_s` that is not positive and finite stands for a millisecond.
+  /// Whatever comes in, the force that goes out is finite and within the limits of force and rate. What is not finite counts as none:
+  /// force, normal; a position, as a jump; an age, as stale; a `dt_s` that is not positive and finite stands for a millisecond.
   Output limit(const Input& in, double dt_s) noexcept;
   [[nodiscard]] double energy_mj() const { return passivity_.energy_mj(); }
   [[nodiscard]] Vec3 velocity_mm_s() const { return velocity_; }
