@@ -218,6 +218,33 @@ TEST(Grains, GoOnInWhatBecomesOfABone) {
   EXPECT_EQ(reach(next, after, back, 9), 1.0F);
 }
 
+// Through a saw cut far off, taking apart and undoing both, what the burr has covered stays known.
+TEST(Removal, WhereTheBurrHasBeenOutlivesSawSplitAndUndo) {
+  World world(block(0.5, {}));
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  HapticRenderer renderer(setup, {}, 1e-3);
+  auto scene = std::make_unique<HapticScene>(HapticScene::of(world, renderer.setup()));
+  renderer.show(scene.get());
+  const Path path = dwell(3, 0.46, 2);
+  for (int t = 0; t < path.seconds() * 1000; ++t) static_cast<void>(renderer.step(path.sample(t * 1e-3)));
+  const std::size_t known = scene->items.front().bone->grains().used();
+  ASSERT_GT(known, 10u);
+  const auto known_after = [&](const SceneAction& action) {
+    EXPECT_TRUE(world.act(action).done);
+    scene = std::make_unique<HapticScene>(HapticScene::of(world, renderer.setup(), scene.get()));
+    std::size_t sum = 0;
+    for (const HapticScene::Item& i : scene->items) sum += i.bone->grains().used();
+    return sum;
+  };
+  EXPECT_EQ(known_after(SceneAction::saw({{3.1, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1})), known);
+  EXPECT_EQ(known_after(SceneAction::split(1)), known);
+  EXPECT_EQ(world.bodies().size(), 2u);
+  EXPECT_EQ(known_after(SceneAction::plain(ActionKind::undo)), known);
+  EXPECT_EQ(known_after(SceneAction::plain(ActionKind::undo)), known);
+  EXPECT_EQ(world.bodies().size(), 1u);
+}
+
 // A piece that was moved, its grid askew: the burr's place is that in the piece.
 TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   auto bone = block(0.5, {});
