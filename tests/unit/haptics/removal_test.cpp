@@ -272,6 +272,18 @@ TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   EXPECT_NEAR(told, removed, 1e-4 * removed);
 }
 
+TEST(Removal, BurrsTooSmallForTheirVoxelsAreTold) {
+  const auto told = [](double diameter, BurrShape shape, double h) {
+    return too_small_for_voxels(burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, diameter, shape))], h);
+  };
+  EXPECT_EQ(told(2, BurrShape::ball, 0.5), "");
+  EXPECT_EQ(told(4, BurrShape::taper, 0.5), "");
+  EXPECT_NE(told(2, BurrShape::taper, 0.5), "");
+  const std::string text = told(2, BurrShape::ball, 0.9);
+  for (const char* const part : {"cutting 2 mm", "0.9 mm", "1.1 voxels", "from 0.5 mm", "--spacing"})
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+}
+
 // Where nothing is known any more of where the burr has been, as where a session goes on from another's end, the bone's own shape stands in
 // for it: the same path again takes a little more at first touch.
 TEST(Removal, OnBoneThatWasDrilledBeforeLittleMoreGoes) {
