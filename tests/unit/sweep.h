@@ -16,10 +16,10 @@ struct Face {
   double at_mm = 0;
 };
 
-/// A block of bone of 16 x 12 x 8 mm, its face near z = 0; densities exact; the face must not stand steep.
+/// A block of bone of 16 x 18 x 8 mm, x from -8, y from -6, its face near z = 0; densities exact; the face must not stand steep.
 inline BrickGrid block(double h, const Face& face) {
   Frame f;
-  f.dims = {static_cast<int>(16 / h), static_cast<int>(12 / h), static_cast<int>(8 / h)};
+  f.dims = {static_cast<int>(16 / h), static_cast<int>(18 / h), static_cast<int>(8 / h)};
   f.spacing_mm = {h, h, h};
   f.origin_mm = {-8, -6, -5};
   std::vector<Ijk> bricks;

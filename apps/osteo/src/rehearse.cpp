@@ -431,8 +431,8 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (j.contains("burrs_too_small")) {
     const double least = 2 * kLeastRadiusVoxels * world->finest_voxel_mm();
-    io.context.warn("balls and cylinders of less than " + format_number(std::ceil(least * 10) / 10) + " mm, tapers of less than " +
-                    format_number(std::ceil(2 * least * 10) / 10) + " mm, are small for voxels of " +
+    io.context.warn("balls and cylinders of less than " + format_number(std::ceil(least * 10 - 1e-6) / 10) + " mm, tapers of less than " +
+                    format_number(std::ceil(2 * least * 10 - 1e-6) / 10) + " mm, are small for voxels of " +
                     format_number(std::round(world->finest_voxel_mm() * 1000) / 1000) +
                     " mm: force and its direction are coarse; prepare with a smaller --spacing, or a finer region of interest");
   }

@@ -218,6 +218,33 @@ TEST(Grains, GoOnInWhatBecomesOfABone) {
   EXPECT_EQ(reach(next, after, back, 9), 1.0F);
 }
 
+// Through a saw cut far off, taking apart and undoing both, what the burr has covered stays known.
+TEST(Removal, WhereTheBurrHasBeenOutlivesSawSplitAndUndo) {
+  World world(block(0.5, {}));
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  HapticRenderer renderer(setup, {}, 1e-3);
+  auto scene = std::make_unique<HapticScene>(HapticScene::of(world, renderer.setup()));
+  renderer.show(scene.get());
+  const Path path = dwell(3, 0.46, 2);
+  for (int t = 0; t < path.seconds() * 1000; ++t) static_cast<void>(renderer.step(path.sample(t * 1e-3)));
+  const std::size_t known = scene->items.front().bone->grains().used();
+  ASSERT_GT(known, 10u);
+  const auto known_after = [&](const SceneAction& action) {
+    EXPECT_TRUE(world.act(action).done);
+    scene = std::make_unique<HapticScene>(HapticScene::of(world, renderer.setup(), scene.get()));
+    std::size_t sum = 0;
+    for (const HapticScene::Item& i : scene->items) sum += i.bone->grains().used();
+    return sum;
+  };
+  EXPECT_EQ(known_after(SceneAction::saw({{3.1, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1})), known);
+  EXPECT_EQ(known_after(SceneAction::split(1)), known);
+  EXPECT_EQ(world.bodies().size(), 2u);
+  EXPECT_EQ(known_after(SceneAction::plain(ActionKind::undo)), known);
+  EXPECT_EQ(known_after(SceneAction::plain(ActionKind::undo)), known);
+  EXPECT_EQ(world.bodies().size(), 1u);
+}
+
 // A piece that was moved, its grid askew: the burr's place is that in the piece.
 TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   auto bone = block(0.5, {});
@@ -243,6 +270,18 @@ TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   const double removed = (before - bone.sum()) * bone.frame().voxel_volume_mm3();
   EXPECT_NEAR(removed / (std::numbers::pi * 0.46 * 0.46 * (2 - 0.46 / 3)), 0.99, 0.02);
   EXPECT_NEAR(told, removed, 1e-4 * removed);
+}
+
+TEST(Removal, BurrsTooSmallForTheirVoxelsAreTold) {
+  const auto told = [](double diameter, BurrShape shape, double h) {
+    return too_small_for_voxels(burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, diameter, shape))], h);
+  };
+  EXPECT_EQ(told(2, BurrShape::ball, 0.5), "");
+  EXPECT_EQ(told(4, BurrShape::taper, 0.5), "");
+  EXPECT_NE(told(2, BurrShape::taper, 0.5), "");
+  const std::string text = told(2, BurrShape::ball, 0.9);
+  for (const char* const part : {"cutting 2 mm", "0.9 mm", "1.1 voxels", "from 0.5 mm", "--spacing"})
+    EXPECT_NE(text.find(part), std::string::npos) << text;
 }
 
 // Where nothing is known any more of where the burr has been, as where a session goes on from another's end, the bone's own shape stands in
