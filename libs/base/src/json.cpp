@@ -263,7 +263,8 @@ std::string field_schema(const FieldRef& f) {
     s["type"] = "array";
     s["items"] = {{"type", kind == "triple" ? "number" : "integer"}};
     if (kind == "list") range(s["items"]);
-    if (kind == "triple") s["minItems"] = s["maxItems"] = 3;
+    if (kind == "triple") s["minItems"] = 3;
+    if (kind == "triple") s["maxItems"] = 3;
   } else if (kind == "choice") {
     s["enum"] = std::get<FieldRef::Choice>(f.target).names;
     s["default"] = text;

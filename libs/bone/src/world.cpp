@@ -254,6 +254,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
 World::Effect World::saw(const SceneAction& a) {
   const SawCut cut = a.saw_cut();
   if (!(length(cut.normal) > 1e-9) || !(cut.kerf_mm > 0)) return nothing("a saw cut needs a direction and a width");
+  if (a.body != SceneAction::kNobody && find(a.body) == nullptr) return nothing("there is no piece " + std::to_string(a.body));
   Effect effect;
   Done before = snapshot(ActionKind::saw);
   for (PlacedBody& placed : bodies_) {

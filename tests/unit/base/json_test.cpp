@@ -132,7 +132,7 @@ TEST(Json, SchemaOfAFieldSaysWhatReadingChecks) {
   Part p;
   const auto fields = fields_of<Part>(p);
   EXPECT_EQ(field_schema(fields[0]), R"({"type":"number","minimum":0.1,"maximum":2.0,"default":0.5,"description":"how wide [mm]"})");
-  EXPECT_EQ(field_schema(fields[4]), R"({"type":"array","items":{"type":"number"},"maxItems":3,"minItems":3,"description":"where [mm]"})");
+  EXPECT_EQ(field_schema(fields[4]), R"({"type":"array","items":{"type":"number"},"minItems":3,"maxItems":3,"description":"where [mm]"})");
   EXPECT_EQ(field_schema(fields[6]), R"({"enum":["red","green"],"default":"red","description":"of it"})");
 }
 
