@@ -168,7 +168,11 @@ void Follower::catch_up() {
   make_dust(changes);
 }
 
-void Follower::end(std::uint64_t ticks) {
+void Follower::end(StreamReader& reader, std::uint64_t ticks) {
+  for (SceneAction a; reader.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
+  for (; !actions_.empty(); actions_.pop_front()) {
+    if (dust_) happen(actions_.front());
+  }
   if (ticks <= next_tick_) return;
   ticks_lost_ += ticks - next_tick_;
   next_tick_ = ticks;

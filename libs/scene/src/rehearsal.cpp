@@ -239,7 +239,7 @@ RehearsalSummary Rehearsal::finish() {
         operation_.finish();
         drain();
       }
-      if (reader_ != nullptr) follower_->end(operation_.ticks());
+      if (reader_ != nullptr) follower_->end(*reader_, operation_.ticks());
       s.surface_hash = follower_->surface_hash();
       s.pieces = follower_->large_pieces();
       if (const Dust* const dust = follower_->dust()) {

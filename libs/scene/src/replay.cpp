@@ -107,7 +107,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
     result.removed_mm3 += static_cast<double>(now.removed_mm3);
   }
-  while (next != actions_end) act();  // done in the last moment
+  for (; next != actions_end; operation.finish()) act();  // done in the last moment
   result.ticks = session.ticks.size();
   result.ticks_repeated = repeated.size();
   result.actions = session.actions.size();
@@ -127,6 +127,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   result.surface_hash = surfaces.surface_hash();
   if (dust && gap == nullptr) {
     dust->drain(*dust_reader);
+    dust->end(*dust_reader, repeated.size());
     result.dust_hash = dust->dust()->hash();
   }
   result.complete = session.end.has_value();

@@ -80,13 +80,14 @@ TEST(Recording, NoActionIsLostByTheClock) {
   for (int start = 0; start < 40; ++start) {
     const auto file = fresh("start.oss");
     RehearsalOptions o = options(file);
-    o.follow = {false, true, false};
+    o.follow = {false, true, true};
     o.actions = {at(0, SceneAction::saw(kCut)), at(0, SceneAction::move(0, {{}, {0, 0, 1}})), at(29, SceneAction::suction({}, 1, 1))};
     Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(strokes(0.03), 1000), o, {});
     r.start();
     while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    r.stop();
+    const RehearsalSummary summary = r.stop();
     EXPECT_EQ(r.take_refusal(), "");
+    EXPECT_NEAR(summary.dust->added_mm3, summary.removed_mm3 + summary.sawn_mm3, 1e-3) << "what is sawn last becomes dust too";
     const Session s = read_session(file);
     std::size_t done = 0;
     for (const RecordedAction& a : s.actions) done += a.action.is(ActionKind::saw) || a.action.is(ActionKind::move) || a.action.is(ActionKind::suction) ? 1 : 0;
@@ -244,7 +245,7 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
     }
     operation.finish();
     follower.drain(reader);
-    follower.end(2000);
+    follower.end(reader, 2000);
     EXPECT_GT(follower.ticks_lost(), 1000u);
     EXPECT_EQ(follower.ticks_lost(), reader.dropped.load());
     const Follower fresh_one(operation.world(), {true, true, false}, 1000, {});

@@ -30,8 +30,9 @@ class Follower {
   /// everything is made again from the bone as it is: right again, but that dust then appeared later than it was made, and structures were
   /// not watched meanwhile.
   std::size_t drain(StreamReader& reader);
-  /// The servo has ended after so many ticks, and drain() took what there was: the last of them may be missing too.
-  void end(std::uint64_t ticks);
+  /// The servo has ended after so many ticks, and drain() took what there was: what was done behind the last happens to the dust, and
+  /// if the last ticks are missing it catches up.
+  void end(StreamReader& reader, std::uint64_t ticks);
   [[nodiscard]] std::uint64_t ticks_lost() const { return ticks_lost_; }
   /// The world was changed by an action, which the stream will tell of; it was drained as far as it went before.
   void follow(const World& world, const World::Effect& effect);
