@@ -86,7 +86,7 @@ TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
   drag(1, 0, 10);
   drag(0, 0, 20);
   drag(1, 10, 30);
-  EXPECT_EQ(w.undo_steps(), 6u);
+  ASSERT_EQ(w.undo_steps(), 6u);
   ASSERT_TRUE(undo());
   EXPECT_EQ(shift(1), 10);
   EXPECT_EQ(shift(0), 20);
@@ -102,7 +102,7 @@ TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
   const std::size_t before = w.undo_steps();
   for (const double mm : {1.0, 2.0, 3.0}) ASSERT_TRUE(w.act(SceneAction::open(1, mm)).done);
   for (const double mm : {1.0, 2.0}) ASSERT_TRUE(w.act(SceneAction::open(2, mm)).done);
-  EXPECT_EQ(w.undo_steps(), before + 2);
+  ASSERT_EQ(w.undo_steps(), before + 2);
   ASSERT_TRUE(undo());
   EXPECT_EQ(w.fixtures()[1].opening_mm, 0);
   EXPECT_EQ(w.fixtures()[0].opening_mm, 3);
