@@ -50,18 +50,6 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
   throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
 }
 
-// What would be given in vain is refused.
-void require_fitting(RehearseCommand::Params p) {
-  static const std::set<std::string_view> of_window{"device", "arm", "width", "height", "state_file"}, of_headless{"script", "side", "seconds", "fast"};
-  RehearseCommand::Params defaults;
-  const auto usual = fields_of<RehearseCommand>(defaults), given = fields_of<RehearseCommand>(p);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() == usual[i].to_text() || !(p.headless ? of_window : of_headless).contains(given[i].doc.name)) continue;
-    throw Error(ExitCode::usage, given[i].flag() + (p.headless ? " is of the window, not with --headless" : " needs --headless"),
-                "'osteo help rehearse' tells which flag is for what");
-  }
-}
-
 }  // namespace
 
 cli::CommandInfo RehearseCommand::info() {
@@ -93,7 +81,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
     for (const char* const name : {"script", "side", "seconds", "fast"})
       refuse(name, "in the window", "add --headless, or leave it out");
   } else {
-    refuse("device", "with --headless", "a script's hand moves the burr; leave it out");
+    for (const char* const name : {"device", "arm"}) refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
+    for (const char* const name : {"width", "height", "state_file"}) refuse(name, "with --headless", "there is no window; leave it out");
   }
 }
 
@@ -102,7 +91,6 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.show_settings) refuse_what_is_ignored(p, io);
   const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
-  require_fitting(p);
   if (p.show_settings) {
     HapticSetup setup;
     setup.params.contact.method = p.contact;

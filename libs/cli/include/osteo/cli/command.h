@@ -64,7 +64,6 @@ struct Invocation {
   std::vector<std::string> arguments;                         ///< positionals, in order
   std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
   std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
-  std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
   Context context;
   std::ostream& out;
   std::ostream& err;
