@@ -8,9 +8,9 @@ void bench_bone(const Context& context);      ///< resampling, surface
 void bench_geometry(const Context& context);  ///< distances, voxels, tetrahedra, curves, masks, skins
 void bench_haptics(const Context& context);   ///< contact, removal, god-object, stability, real time
 void bench_haptics_fuzz(const Context& context);
-void bench_removal(const Context& context);  ///< what is removed against what the burr swept
+void bench_removal(const Context& context);    ///< what is removed against what the burr swept
 void bench_operation(const Context& context);  ///< scenes that are operated on: latency, split, plates, regions
 void bench_tissue(const Context& context);     ///< finite elements, the fast model, its calibration
-void bench_import(const Context& context);    ///< DICOM to a volume
+void bench_import(const Context& context);     ///< DICOM to a volume
 
 }  // namespace osteo

@@ -25,9 +25,11 @@ int main(int argc, char** argv) {
     return 2;
   }
 #endif
-  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" && subject != "operation" && subject != "tissue" &&
-      subject != "haptics-fuzz" && subject != "removal") {
-    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, removal, tissue\n", subject.c_str());
+  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" &&
+      subject != "operation" && subject != "tissue" && subject != "haptics-fuzz" && subject != "removal") {
+    std::fprintf(stderr,
+                 "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, removal, tissue\n",
+                 subject.c_str());
     return 2;
   }
   return 0;

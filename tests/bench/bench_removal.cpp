@@ -26,9 +26,12 @@ struct Range {
 
 Path path_of(int tool, int passes) {
   const Burr& burr = burr_library()[static_cast<std::size_t>(tool)];
-  const Vec3 axis = burr.shape == BurrShape::ball ? Vec3{0.6, 0, 0.8} : burr.shape == BurrShape::cylinder ? Vec3{0.2, 0.1, 1} : Vec3{0.2, 0.95, 0.2};
+  const Vec3 axis = burr.shape == BurrShape::ball       ? Vec3{0.6, 0, 0.8}
+                    : burr.shape == BurrShape::cylinder ? Vec3{0.2, 0.1, 1}
+                                                        : Vec3{0.2, 0.95, 0.2};
   const double depth = std::min(0.46, 0.23 * burr.diameter_mm);
-  return passes == 0 ? test::dwell(tool, depth, burr.diameter_mm > 5 ? 8 : 3, axis) : test::groove(tool, depth, 1, passes, 0.3 * burr.diameter_mm, axis);
+  return passes == 0 ? test::dwell(tool, depth, burr.diameter_mm > 5 ? 8 : 3, axis)
+                     : test::groove(tool, depth, 1, passes, 0.3 * burr.diameter_mm, axis);
 }
 // So slow that the burr takes all that it reaches.
 void take_time(Path& path, double swept_mm3) {
@@ -51,7 +54,9 @@ double ratio(int tool, int passes, const Face& face, double h, ContactMethod met
 
 void bench_removal(const Context&) {
   const char* const ways[] = {"resting", "a groove", "two side by side"};
-  std::printf("### Removed over swept, by method and voxel\n\n2 mm ball and 4 mm cylinder, on faces off the voxels' borders, 250 Hz, time enough: least to most.\n\n| method | path |");
+  std::printf(
+      "### Removed over swept, by method and voxel\n\n2 mm ball and 4 mm cylinder, on faces off the voxels' borders, 250 Hz, time enough: "
+      "least to most.\n\n| method | path |");
   for (const double h : kVoxels) std::printf(" %g mm |", h);
   std::printf("\n|---|---|---|---|---|---|---|\n");
   for (const ContactMethod method : kMethods) {
@@ -77,7 +82,9 @@ void bench_removal(const Context&) {
       std::fflush(stdout);
     }
   }
-  std::printf("\n### By rate of the servo, and where the hand is too fast\n\nA 4 mm ball in 0.5 mm voxels by overlap; the fast groove at 40 mm/s, once and 100 times.\n\n| Hz | resting | a groove | two side by side | fast, once | fast, 100 times |\n|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n### By rate of the servo, and where the hand is too fast\n\nA 4 mm ball in 0.5 mm voxels by overlap; the fast groove at 40 mm/s, "
+      "once and 100 times.\n\n| Hz | resting | a groove | two side by side | fast, once | fast, 100 times |\n|---|---|---|---|---|---|\n");
   for (const double hz : {500.0, 1000.0, 2000.0, 5000.0}) {
     std::printf("| %g |", hz);
     for (int passes = 0; passes < 3; ++passes) std::printf(" %.3f |", ratio(3, passes, kFaces[0], 0.5, ContactMethod::overlap, hz));

@@ -1,4 +1,5 @@
-// Prints hashes of what the servo computes and of what it starts from, in full precision. check_same_bits.py runs it as other machines would.
+// Prints hashes of what the servo computes and of what it starts from, in full precision. check_same_bits.py runs it as other machines
+// would.
 #include <cmath>
 #include <cstdio>
 
@@ -120,8 +121,7 @@ void servo(ContactMethod method, int tool) {
   Script script;
   script.tool = tool;
   script.axis = {0.6, 0, 0.8};
-  for (int i = 0; i <= 30; ++i)
-    script.waypoints.push_back({0.1 * i, {0.3 * (i % 7) - 1, 0.4 * (i % 5) - 1, 4 - 0.2 * i}, i % 5 != 0});
+  for (int i = 0; i <= 30; ++i) script.waypoints.push_back({0.1 * i, {0.3 * (i % 7) - 1, 0.4 * (i % 5) - 1, 4 - 0.2 * i}, i % 5 != 0});
   ScriptedDevice device(script, 1000);
   Servo loop(renderer, device, stream, 1000);
   while (loop.step(0)) {
@@ -139,8 +139,8 @@ void servo(ContactMethod method, int tool) {
     sum.add(change);
     ++changes;
   }
-  sum.print("servo-" + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + "-tool-" + std::to_string(tool) + "-" +
-            std::to_string(ticks) + "-ticks-" + std::to_string(changes) + "-changes-" + bone.hash());
+  sum.print("servo-" + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + "-tool-" + std::to_string(tool) +
+            "-" + std::to_string(ticks) + "-ticks-" + std::to_string(changes) + "-changes-" + bone.hash());
 }
 
 }  // namespace

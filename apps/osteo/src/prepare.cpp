@@ -49,11 +49,14 @@ std::map<std::string, std::optional<std::string>> given_now(const std::vector<Fi
   }
   for (const auto& [name, value] : io.settings) {
     if (own(name) || name == "source" || name == "case")
-      throw Error(ExitCode::usage, "--set " + name + ": that is not a setting of the pipeline here", "'osteo help prepare' shows how it is given");
+      throw Error(ExitCode::usage, "--set " + name + ": that is not a setting of the pipeline here",
+                  "'osteo help prepare' shows how it is given");
     given[name] = value.empty() ? std::nullopt : std::optional(value);
   }
-  if (const auto it = given.find("preset"); it != given.end() && it->second && *it->second != "fixed" && given.contains("lower") && given["lower"])
-    throw Error(ExitCode::usage, "--lower does nothing with --preset " + *it->second + ", which finds the threshold itself", "give one of them");
+  if (const auto it = given.find("preset");
+      it != given.end() && it->second && *it->second != "fixed" && given.contains("lower") && given["lower"])
+    throw Error(ExitCode::usage, "--lower does nothing with --preset " + *it->second + ", which finds the threshold itself",
+                "give one of them");
   return given;
 }
 
@@ -67,14 +70,16 @@ cli::CommandInfo PrepareCommand::info() {
       "what is unchanged, and the case remembers the flags that made it: only what is given again changes, and it says what from and to. "
       "--fresh forgets them all, --no-structures (or another of the text flags) or an empty --set NAME= drops one. Until the new state is "
       "whole the case stays as it was. Variables of the pipeline are also set with --set NAME=VALUE.",
-      {{"source", "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti); may be left out when the case was made on this "
-                  "machine",
+      {{"source",
+        "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti); may be left out when the case was made on this "
+        "machine",
         true}},
       "osteo prepare DICOM_FOLDER -o CASE"};
 }
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {
-  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo prepare " + (io.arguments.empty() ? "SCAN" : io.arguments[0]) + " -o CASE");
+  if (p.out.empty())
+    throw Error(ExitCode::usage, "where to? osteo prepare " + (io.arguments.empty() ? "SCAN" : io.arguments[0]) + " -o CASE");
   const fs::path folder = p.out;
   Params given_params = p;
   const auto fields = fields_of<PrepareCommand>(given_params);
@@ -106,7 +111,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     source = input_of(io.arguments[0]);
     if (before && before->source_hash != source.hash) {
       if (!io.common.force) {
-        throw Error(ExitCode::cannot_write, "'" + folder.string() + "' was made from another scan than '" + io.arguments[0] + "', or the scan was changed",
+        throw Error(ExitCode::cannot_write,
+                    "'" + folder.string() + "' was made from another scan than '" + io.arguments[0] + "', or the scan was changed",
                     "give another name, or --force to make the case anew from this scan, without the flags it remembers");
       }
       notes.push_back("another scan: forgotten is" + all_of(*before));
@@ -116,7 +122,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (!before) throw Error(ExitCode::usage, "of which scan? osteo prepare SCAN -o " + p.out);
     const auto path = recall_file(before->source_hash);
     if (!path) {
-      throw Error(ExitCode::no_input, "the scan of '" + folder.string() + "' is not known here, or was moved or changed: a case does not hold its name",
+      throw Error(ExitCode::no_input,
+                  "the scan of '" + folder.string() + "' is not known here, or was moved or changed: a case does not hold its name",
                   "give it: osteo prepare SCAN -o " + p.out);
     }
     source = {*path, before->source_hash};
@@ -138,7 +145,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   } else if (!recipe.pipeline_hash.empty()) {
     const auto path = recall_file(recipe.pipeline_hash);
     if (!path) {
-      throw Error(ExitCode::no_input, "the pipeline file that '" + folder.string() + "' was made with is not known here, or was moved or changed",
+      throw Error(ExitCode::no_input,
+                  "the pipeline file that '" + folder.string() + "' was made with is not known here, or was moved or changed",
                   "give it again with --pipeline, or --no-pipeline for the built-in one");
     }
     text = read_text(*path);
@@ -155,13 +163,14 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       structures.path = folder / "structures.seg.nrrd";
       as_the_case_holds_them = true;
     } else {
-      throw Error(ExitCode::no_input, "the label map of the structures of '" + folder.string() + "' is not known here, or was moved or changed",
+      throw Error(ExitCode::no_input,
+                  "the label map of the structures of '" + folder.string() + "' is not known here, or was moved or changed",
                   "give it again with --structures, or --no-structures to drop them");
     }
   }
   const bool other_structures = before && structures.hash != before->structures_hash;
   if (other_structures) {
-    notes.push_back(structures.hash.empty()            ? "--structures: dropped"
+    notes.push_back(structures.hash.empty()           ? "--structures: dropped"
                     : before->structures_hash.empty() ? "--structures: new"
                                                       : "--structures: another label map");
   }
@@ -187,13 +196,16 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   }
   const auto changes = change_settings(recipe, wanted, other_structures);
   if (!recipe.lost.empty()) {
-    throw Error(ExitCode::no_input, "the case was made with " + flag_of(*recipe.lost.begin(), "...", fields) + ", whose value names the scan and is not known here",
-                "give it again, or drop it with an empty one");
+    throw Error(
+        ExitCode::no_input,
+        "the case was made with " + flag_of(*recipe.lost.begin(), "...", fields) + ", whose value names the scan and is not known here",
+        "give it again, or drop it with an empty one");
   }
   if (recipe.settings.contains("names") && structures.path.empty())
     throw Error(ExitCode::usage, "--names is for --structures, which the case does not have", "give --structures, or --no-names");
   for (const auto& [name, value] : recipe.settings) {
-    const bool names_file = std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name && v.in_file_name; });
+    const bool names_file =
+        std::any_of(known.begin(), known.end(), [&](const PipelineVariable& v) { return v.name == name && v.in_file_name; });
     if (names_file || value.find('/') != std::string::npos || without_uid(value) != value) recipe.withheld.insert(name);
   }
 
@@ -239,7 +251,9 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   for (const std::string& note : notes) io.context.info(note);
   if (before) {
     for (const RecipeChange& c : changes) {
-      const auto flag = [&](const std::optional<std::string>& v) { return v ? flag_of(c.name, *v, fields) : std::string("as the pipeline has it"); };
+      const auto flag = [&](const std::optional<std::string>& v) {
+        return v ? flag_of(c.name, *v, fields) : std::string("as the pipeline has it");
+      };
       io.context.info("changed: " + flag(c.from) + " -> " + flag(c.to) + (c.why.empty() ? "" : ", since " + c.why));
     }
     std::string kept;
@@ -253,9 +267,9 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
   }
 
   try {
-    auto results = run_pipeline(std::move(pipeline), io.registry,
-                                {.overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }},
-                                io.context);
+    auto results = run_pipeline(
+        std::move(pipeline), io.registry,
+        {.overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }}, io.context);
     recall_facts(folder, results);
     update.commit(make_manifest(update, name, results, recipe));
     remember(source.hash, fs::absolute(source.path).string());

@@ -53,14 +53,15 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
 }  // namespace
 
 cli::CommandInfo RehearseCommand::info() {
-  return {"rehearse",
-          "drill the bone of a case, in a window or by script",
-          "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
-          "servo, and the session, "
-          "pictures from before and after, and a summary are written. Exit code 8 when actions of the script were refused: the summary lists "
-          "them. Dense bone resists the burr more, by the HU that the case keeps (\"hardness\": false in --settings turns that off).",
-          {{"case", "a folder made by prepare"}},
-          "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
+  return {
+      "rehearse",
+      "drill the bone of a case, in a window or by script",
+      "Opens the window: the bone beside three cuts, a drill moved by the mouse. With --headless a scripted hand drives the same "
+      "servo, and the session, "
+      "pictures from before and after, and a summary are written. Exit code 8 when actions of the script were refused: the summary lists "
+      "them. Dense bone resists the burr more, by the HU that the case keeps (\"hardness\": false in --settings turns that off).",
+      {{"case", "a folder made by prepare"}},
+      "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
 
 namespace {
@@ -78,8 +79,7 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
     for (const char* const name : {"side", "seconds"}) refuse(name, "beside --script", "it belongs to the built-in strokes; leave it out");
   }
   if (!p.headless) {
-    for (const char* const name : {"script", "side", "seconds", "fast"})
-      refuse(name, "in the window", "add --headless, or leave it out");
+    for (const char* const name : {"script", "side", "seconds", "fast"}) refuse(name, "in the window", "add --headless, or leave it out");
   } else {
     for (const char* const name : {"device", "arm"}) refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
     for (const char* const name : {"width", "height", "state_file"}) refuse(name, "with --headless", "there is no window; leave it out");
@@ -175,8 +175,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   // Told even when quiet: the exit code is about them.
   for (const ActionNote& n : s.notes) {
     if (n.done && io.common.quiet) continue;
-    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << format_number(static_cast<double>(n.tick) / p.rate_hz) << " s: "
-           << name_of(n.kind) << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
+    io.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << format_number(static_cast<double>(n.tick) / p.rate_hz)
+           << " s: " << name_of(n.kind) << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
   }
   if (s.unusable_poses > 0)
     io.err << "the pose could not be used for " << format_number(static_cast<double>(s.unusable_poses) / p.rate_hz)
@@ -188,7 +188,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
       io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
              << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
     if (s.ticks_not_followed > 0)
-      io.err << "surface, pieces and dust missed " << s.ticks_not_followed << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
+      io.err << "surface, pieces and dust missed " << s.ticks_not_followed
+             << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
     if (s.loop) {
       const LoopStats& l = *s.loop;
       io.err << "servo: work p50 " << std::lround(l.work.quantile_us(0.5)) << " us, p99.9 " << std::lround(l.work.quantile_us(0.999))
@@ -204,14 +205,15 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
 }
 
 cli::CommandInfo ReplayCommand::info() {
-  return {"replay",
-          "run a session again and prove that it comes out the same",
-          "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; "
-          "also applies the recorded "
-          "voxel changes and compares that. Exit code 7 when anything differs, 8 when ticks were not recorded (what comes before is repeated, "
-          "the rest taken from the recorded changes), 4 when the file is damaged.",
-          {{"session", "a session folder"}},
-          "osteo replay SESSION"};
+  return {
+      "replay",
+      "run a session again and prove that it comes out the same",
+      "Feeds the recorded poses to the same servo on the case's bone and compares every tick, the bone and the surface bit for bit; "
+      "also applies the recorded "
+      "voxel changes and compares that. Exit code 7 when anything differs, 8 when ticks were not recorded (what comes before is repeated, "
+      "the rest taken from the recorded changes), 4 when the file is damaged.",
+      {{"session", "a session folder"}},
+      "osteo replay SESSION"};
 }
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
@@ -232,10 +234,12 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
     save_grid(to_sparse(r.world->bodies().front().body->bone, "density"), p.bone_out);
   }
   io.end_progress();
-  ordered_json j{{"ticks", r.ticks},         {"ticks_repeated", r.ticks_repeated}, {"actions", r.actions},
-                 {"identical", r.identical}, {"complete", r.complete},             {"losses", r.losses},
-                 {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},     {"dust_hash", r.dust_hash},
-                 {"removed_mm3", r.removed_mm3}, {"seconds", r.seconds}};
+  ordered_json j{{"ticks", r.ticks},         {"ticks_repeated", r.ticks_repeated},
+                 {"actions", r.actions},     {"identical", r.identical},
+                 {"complete", r.complete},   {"losses", r.losses},
+                 {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},
+                 {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3},
+                 {"seconds", r.seconds}};
   if (anatomy.structures) j["structures"] = ordered_json::parse(structures_json(r.structures, *anatomy.structures, session.header.rate_hz));
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (io.common.json) io.out << j.dump(2) << '\n';
@@ -244,10 +248,12 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const bool whole = session.gaps.empty();
   if (!whole) {
     io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "
-           << (session.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone") << '\n';
+           << (session.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone")
+           << '\n';
   }
   if (!io.common.quiet) {
-    io.err << "replayed " << r.ticks_repeated << " ticks and " << r.actions << " actions in " << format_number(std::round(r.seconds * 100) / 100)
+    io.err << "replayed " << r.ticks_repeated << " ticks and " << r.actions << " actions in "
+           << format_number(std::round(r.seconds * 100) / 100)
            << " s: " << (r.identical ? "bit for bit the same" : "DIFFERENT, " + r.difference)
            << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
@@ -415,7 +421,8 @@ int SceneCommand::run(const Params& p, cli::Invocation& io) {
         });
   // The smallest of the library that these voxels bear, and what is to be said of the smaller ones.
   for (const Burr& burr : burr_library()) {
-    if (const std::string text = too_small_for_voxels(burr, world->finest_voxel_mm()); !text.empty()) j["burrs_too_small"].push_back(burr.name());
+    if (const std::string text = too_small_for_voxels(burr, world->finest_voxel_mm()); !text.empty())
+      j["burrs_too_small"].push_back(burr.name());
   }
   if (j.contains("burrs_too_small")) {
     const double least = 2 * kLeastRadiusVoxels * world->finest_voxel_mm();

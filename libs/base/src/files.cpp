@@ -227,7 +227,8 @@ void write_folder_atomically(const fs::path& path, const std::function<void(cons
   fs::rename(temporary.path(), target, ec);
   if (!ec || exchange(temporary.path(), target)) return;
   if (ec.value() != ENOTEMPTY && ec.value() != EEXIST) throw_write_error(target, ec.value());
-  // Some file systems cannot exchange: the old folder steps aside under a name of its own, which no clean-up removes, until the new one is there.
+  // Some file systems cannot exchange: the old folder steps aside under a name of its own, which no clean-up removes, until the new one is
+  // there.
   const fs::path aside = target.string() + ".old-" + std::to_string(::getpid());
   fs::rename(target, aside, ec);
   if (ec) throw_write_error(target, ec.value());

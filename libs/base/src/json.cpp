@@ -193,8 +193,8 @@ void JsonFile::read(const JsonValue& object, const std::string& where, std::span
     if (const JsonValue* const value = object.find(f.doc.name); value != nullptr) {
       read(*value, where, f);
     } else if (f.doc.needed) {
-      throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) + "\" is missing: " + std::string(f.doc.help) +
-                              (f.doc.unit.empty() ? "" : ", " + std::string(f.doc.unit)));
+      throw wrong(object, (where.empty() ? "" : where + ": ") + "\"" + std::string(f.doc.name) +
+                              "\" is missing: " + std::string(f.doc.help) + (f.doc.unit.empty() ? "" : ", " + std::string(f.doc.unit)));
     }
   }
 }

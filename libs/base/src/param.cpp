@@ -67,12 +67,11 @@ std::string FieldRef::flag() const {
 }
 
 std::string_view FieldRef::kind() const {
-  return std::visit(
-      Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
-               [](double*) { return std::string_view("number"); }, [](std::string*) { return std::string_view("text"); },
-               [](std::array<double, 3>*) { return std::string_view("triple"); },
-               [](std::vector<int>*) { return std::string_view("list"); }, [](Choice) { return std::string_view("choice"); }},
-      target);
+  return std::visit(Overload{[](bool*) { return std::string_view("flag"); }, [](int*) { return std::string_view("int"); },
+                             [](double*) { return std::string_view("number"); }, [](std::string*) { return std::string_view("text"); },
+                             [](std::array<double, 3>*) { return std::string_view("triple"); },
+                             [](std::vector<int>*) { return std::string_view("list"); }, [](Choice) { return std::string_view("choice"); }},
+                    target);
 }
 
 std::string FieldRef::to_text() const {

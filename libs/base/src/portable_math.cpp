@@ -13,10 +13,9 @@ constexpr double kPi = std::numbers::pi, kHalfPi = kPi / 2;
 // Of r within an eighth of a turn, by Taylor's series: what is left out is below 1e-19 and 3e-18.
 SinCos of_small(double r) noexcept {
   const double z = r * r;
-  constexpr double kSin[8] = {-1 / 6.0,          1 / 120.0,          -1 / 5040.0,           1 / 362880.0,
-                              -1 / 39916800.0,   1 / 6227020800.0,   -1 / 1307674368000.0,  1 / 355687428096000.0};
-  constexpr double kCos[7] = {1 / 24.0,          -1 / 720.0,         1 / 40320.0,           -1 / 3628800.0,
-                              1 / 479001600.0,   -1 / 87178291200.0, 1 / 20922789888000.0};
+  constexpr double kSin[8] = {-1 / 6.0,        1 / 120.0,        -1 / 5040.0,          1 / 362880.0,
+                              -1 / 39916800.0, 1 / 6227020800.0, -1 / 1307674368000.0, 1 / 355687428096000.0};
+  constexpr double kCos[7] = {1 / 24.0, -1 / 720.0, 1 / 40320.0, -1 / 3628800.0, 1 / 479001600.0, -1 / 87178291200.0, 1 / 20922789888000.0};
   double s = kSin[7], c = kCos[6];
   for (int i = 6; i >= 0; --i) s = s * z + kSin[i];
   for (int i = 5; i >= 0; --i) c = c * z + kCos[i];

@@ -99,8 +99,9 @@ PlateModel make_distractor() {
         return std::min({strip(p, left, kRing, kBar, kHole, 1), block(p, -5.5), rod(p, -24, 30, kRod / 2)});
       },
       {-24, -kRing / 2, 0}, {30, kRing / 2, kRodHeight + kBlock / 2}, kVoxel);
-  m.moving = surface_of([&](Vec3 p) { return std::max(std::min(strip(p, right, kRing, kBar, kHole, 1), block(p, 5.5)), -rod(p, -99, 99, kRod / 2 + 0.3)); },
-                        {0.5, -kRing / 2, 0}, {20, kRing / 2, kRodHeight + kBlock / 2}, kVoxel);
+  m.moving = surface_of(
+      [&](Vec3 p) { return std::max(std::min(strip(p, right, kRing, kBar, kHole, 1), block(p, 5.5)), -rod(p, -99, 99, kRod / 2 + 0.3)); },
+      {0.5, -kRing / 2, 0}, {20, kRing / 2, kRodHeight + kBlock / 2}, kVoxel);
   m.holes_mm = left;
   m.holes_mm.insert(m.holes_mm.end(), right.begin(), right.end());
   return m;
@@ -113,10 +114,13 @@ const std::vector<PlateModel>& plate_library() {
     // Miniplates: 0.9 to 1.0 mm thick, 2.0 mm screws (M. Champy et al., J. Maxillofac. Surg. 6, 1978, and the 2.0 mm systems since);
     // midface plates of the 1.5 mm systems; load-bearing reconstruction plates of the 2.4 mm systems, 2.5 mm thick, holes 8 mm apart.
     std::vector<PlateModel> all;
-    for (const StripPlan& s : {StripPlan{"miniplate-4", "miniplate: 1.0 mm thick, 4 holes for 2.0 mm screws, with a gap", 4, 6.5, 3, 5.5, 2.6, 2.2, 1.0, 2.0, 0.2},
-                               StripPlan{"miniplate-6", "miniplate: 1.0 mm thick, 6 holes for 2.0 mm screws", 6, 6.5, 0, 5.5, 2.6, 2.2, 1.0, 2.0, 0.2},
-                               StripPlan{"midface-4", "midface plate: 0.6 mm thick, 4 holes for 1.5 mm screws", 4, 4.5, 1.5, 3.6, 1.8, 1.7, 0.6, 1.5, 0.15},
-                               StripPlan{"reconstruction-8", "reconstruction plate: 2.5 mm thick, 8 holes for 2.4 mm screws", 8, 8, 0, 8, 5, 2.8, 2.5, 2.4, 0.3}}) {
+    for (const StripPlan& s :
+         {StripPlan{"miniplate-4", "miniplate: 1.0 mm thick, 4 holes for 2.0 mm screws, with a gap", 4, 6.5, 3, 5.5, 2.6, 2.2, 1.0, 2.0,
+                    0.2},
+          StripPlan{"miniplate-6", "miniplate: 1.0 mm thick, 6 holes for 2.0 mm screws", 6, 6.5, 0, 5.5, 2.6, 2.2, 1.0, 2.0, 0.2},
+          StripPlan{"midface-4", "midface plate: 0.6 mm thick, 4 holes for 1.5 mm screws", 4, 4.5, 1.5, 3.6, 1.8, 1.7, 0.6, 1.5, 0.15},
+          StripPlan{"reconstruction-8", "reconstruction plate: 2.5 mm thick, 8 holes for 2.4 mm screws", 8, 8, 0, 8, 5, 2.8, 2.5, 2.4,
+                    0.3}}) {
       all.push_back(make_strip(s));
     }
     all.push_back(make_distractor());

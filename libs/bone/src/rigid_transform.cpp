@@ -2,7 +2,6 @@
 
 #include "osteo/base/portable_math.h"
 
-
 namespace osteo {
 
 RigidTransform rotation_about(Vec3 point, Vec3 axis, double angle) {

@@ -49,10 +49,10 @@ BrickGrid face_field(const Labels& crop) {
         const auto side = [&](int a, int b, int c) { return (crop.voxels[crop.offset(i + a, j + b, k + c)] != 0) == inside; };
         const bool deep = side(-1, 0, 0) && side(1, 0, 0) && side(0, -1, 0) && side(0, 1, 0) && side(0, 0, -1) && side(0, 0, 1);
         if (deep && !inside) continue;
-        std::uint8_t& brick = wanted[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>((ny + 7) / 8) +
-                                      static_cast<std::size_t>(j / 8)) *
-                                         static_cast<std::size_t>((nx + 7) / 8) +
-                                     static_cast<std::size_t>(i / 8)];
+        std::uint8_t& brick =
+            wanted[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>((ny + 7) / 8) + static_cast<std::size_t>(j / 8)) *
+                       static_cast<std::size_t>((nx + 7) / 8) +
+                   static_cast<std::size_t>(i / 8)];
         if (brick == 0) bricks.push_back({i / 8, j / 8, k / 8});
         brick = 1;
         if (deep) continue;

@@ -182,7 +182,8 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::irrigate:
       held_ = was_held;
       if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
-        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) + " mm make sense");
+        return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
+                       " mm make sense");
       break;
     case ActionKind::yield:
       held_ = was_held;

@@ -287,7 +287,8 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   ::signal(SIGXFSZ, SIG_IGN);
   std::unique_ptr<ProgressPrinter> printer;
   const std::vector<std::string> args{argv + 1, argv + argc};
-  const bool json = std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") != std::find(args.begin(), args.end(), "--");
+  const bool json =
+      std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") != std::find(args.begin(), args.end(), "--");
   const auto failed = [&](const Error& e) {
     if (printer) printer->clear();
     return fail(e, json, out, err);
@@ -306,7 +307,8 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   } catch (const std::bad_alloc&) {
     return failed(Error(ExitCode::resources, "out of memory", "use larger voxels or a smaller region"));
   } catch (const std::exception& e) {
-    return failed(Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"));
+    return failed(
+        Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it"));
   }
 }
 

@@ -54,7 +54,8 @@ std::pair<std::string, std::string> fact_text(const std::string& key, const Repo
 }
 
 std::string error_json(const Error& error) {
-  const auto* doc = std::find_if(std::begin(exit_code_table), std::end(exit_code_table), [&](const auto& d) { return d.code == error.code(); });
+  const auto* doc =
+      std::find_if(std::begin(exit_code_table), std::end(exit_code_table), [&](const auto& d) { return d.code == error.code(); });
   nlohmann::ordered_json j;
   j["error"] = {{"exit_code", static_cast<int>(error.code())},
                 {"name", doc == std::end(exit_code_table) ? "" : std::string(doc->name)},

@@ -19,8 +19,9 @@ void require_valid(const Frame& frame) {
     if (!std::isfinite(frame.origin_mm[a])) throw Error(ExitCode::corrupt, "the volume's position is not a number");
   }
   if (static_cast<double>(frame.dims[0]) * frame.dims[1] * frame.dims[2] > 1e18)
-    throw Error(ExitCode::corrupt, "the volume has " + std::to_string(frame.dims[0]) + " x " + std::to_string(frame.dims[1]) + " x " +
-                std::to_string(frame.dims[2]) + " voxels: more than can be counted",
+    throw Error(ExitCode::corrupt,
+                "the volume has " + std::to_string(frame.dims[0]) + " x " + std::to_string(frame.dims[1]) + " x " +
+                    std::to_string(frame.dims[2]) + " voxels: more than can be counted",
                 "voxels far from the rest are mostly a fault of the program that wrote it; make it again");
   const auto& c = frame.direction.column;
   double worst = 0;

@@ -14,10 +14,13 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
   std::sort(origins_.begin(), origins_.end(), [](Ijk a, Ijk b) { return std::tie(a.k, a.j, a.i) < std::tie(b.k, b.j, b.i); });
   if (too_many_bricks(origins_.size()))
     throw Error(ExitCode::corrupt,
-                "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " + std::to_string(kMostBricks) + " can be numbered",
+                "the sparse grid has " + std::to_string(origins_.size()) + " bricks of 8^3 voxels; " + std::to_string(kMostBricks) +
+                    " can be numbered",
                 "make it with larger voxels, or of a smaller region");
   for (const Ijk b : origins_) {
-    if (b.i < 0 || b.j < 0 || b.k < 0) throw Error(ExitCode::corrupt, "the sparse grid has voxels at negative indices", "bone begins at index 0; make it again with resample");
+    if (b.i < 0 || b.j < 0 || b.k < 0)
+      throw Error(ExitCode::corrupt, "the sparse grid has voxels at negative indices",
+                  "bone begins at index 0; make it again with resample");
     extent_[0] = std::max(extent_[0], static_cast<std::uint32_t>(b.i + 1));
     extent_[1] = std::max(extent_[1], static_cast<std::uint32_t>(b.j + 1));
     extent_[2] = std::max(extent_[2], static_cast<std::uint32_t>(b.k + 1));

@@ -181,7 +181,8 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
     if (first == 0) builder.begin(slabs.frame());
     builder.take(first, layers, slab);
     if (too_many_bricks(builder.density_grid->tree().leafCount()))
-      throw refuse("more than " + std::to_string(BrickGrid::kMostBricks) + " bricks of 8^3 that hold bone, which is all that can be numbered");
+      throw refuse("more than " + std::to_string(BrickGrid::kMostBricks) +
+                   " bricks of 8^3 that hold bone, which is all that can be numbered");
   });
   const Frame& frame = slabs.frame();
   result.verdict = slabs.verdict();

@@ -204,12 +204,14 @@ class Resampler {
       if (std::abs(fine - std::round(fine)) < 1e-6) step = static_cast<int>(std::lround(fine));
     }
     if (step == 0)
-      throw Error(ExitCode::usage, "no whole number of voxels of " + format_number(h_) + " mm fills voxels of " + format_number(p.align_mm) + " mm",
+      throw Error(ExitCode::usage,
+                  "no whole number of voxels of " + format_number(h_) + " mm fills voxels of " + format_number(p.align_mm) + " mm",
                   "choose a --spacing-mm like 0.1, 0.125, 0.2 or 0.25");
     const Vec3 centre = ct_.frame.index_from_world({p.centre_mm[0], p.centre_mm[1], p.centre_mm[2]});
     for (std::size_t a = 0; a < 3; ++a) {
       const double middle = (centre[a] + 0.5) * ct_.frame.spacing_mm[a] / h_, half = p.box_mm[a] / h_ / 2;
-      const int lo = static_cast<int>(std::floor((middle - half) / step + 1e-6)) * step, hi = static_cast<int>(std::ceil((middle + half) / step - 1e-6)) * step;
+      const int lo = static_cast<int>(std::floor((middle - half) / step + 1e-6)) * step,
+                hi = static_cast<int>(std::ceil((middle + half) / step - 1e-6)) * step;
       first_[a] = std::max(lo, 0);
       const int end = std::min(hi, frame_.dims[a] / step * step);
       if (end <= first_[a]) throw Error(ExitCode::usage, "the box does not lie in the image", "give --centre-mm in LPS mm, within the CT");
@@ -260,8 +262,9 @@ class Resampler {
           }
           if (any) bricks_.push_back({i, j, k});
           if (too_many_bricks(bricks_.size()))
-            throw Error(ExitCode::resources, "voxels of " + format_number(h_) + " mm make more than " + std::to_string(BrickGrid::kMostBricks) +
-                        " bricks of 8^3 that may hold bone, which is all that can be numbered",
+            throw Error(ExitCode::resources,
+                        "voxels of " + format_number(h_) + " mm make more than " + std::to_string(BrickGrid::kMostBricks) +
+                            " bricks of 8^3 that may hold bone, which is all that can be numbered",
                         "choose a larger --spacing-mm, or a smaller region");
         }
       }
@@ -332,8 +335,10 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   for (std::size_t a = 0; a < 3; ++a)
     cells[a] = static_cast<std::uint64_t>(std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
   if (too_wide_for_bricks(cells)) {
-    throw Error(ExitCode::resources, "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " +
-                std::to_string(BrickGrid::kMostCells) + " bricks of 8^3", "choose a larger --spacing-mm, or a smaller region");
+    throw Error(ExitCode::resources,
+                "voxels of " + format_number(p.spacing_mm) + " mm make a grid of more than " + std::to_string(BrickGrid::kMostCells) +
+                    " bricks of 8^3",
+                "choose a larger --spacing-mm, or a smaller region");
   }
   ResampledBone result;
   result.volume_before_mm3 = static_cast<double>(std::count_if(mask.span().begin(), mask.span().end(), [](auto v) { return v != 0; })) *

@@ -80,8 +80,10 @@ BrickGrid to_bricks(const SparseGrid& sparse, bool all) {
   tile.setMaxDepth(openvdb::FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) tiles += tile.getVoxelCount() / BrickGrid::kVoxels;
   if (too_many_bricks(tiles))
-    throw Error(ExitCode::corrupt, "the sparse grid is solid over " + std::to_string(tiles) + " bricks of 8^3 voxels; " +
-                std::to_string(BrickGrid::kMostBricks) + " can be numbered", "make it with larger voxels, or of a smaller region");
+    throw Error(ExitCode::corrupt,
+                "the sparse grid is solid over " + std::to_string(tiles) + " bricks of 8^3 voxels; " +
+                    std::to_string(BrickGrid::kMostBricks) + " can be numbered",
+                "make it with larger voxels, or of a smaller region");
   openvdb::FloatTree tree(stored);
   tree.voxelizeActiveTiles();
   std::vector<Ijk> bricks;

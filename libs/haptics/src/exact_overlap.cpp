@@ -97,11 +97,7 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 }
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
-    : params_(params),
-      spacing_mm_(spacing_mm),
-      shell_depths_(shell_depths(spacing_mm)),
-      overlap_(0),
-      head_(spacing_mm) {
+    : params_(params), spacing_mm_(spacing_mm), shell_depths_(shell_depths(spacing_mm)), overlap_(0), head_(spacing_mm) {
   for (const Burr& b : burr_library()) shells_.push_back(shell_of(b.head(), spacing_mm));
 }
 

@@ -135,7 +135,8 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
   const bool inner = (place & 7) - 1 < 6U && (place >> 3 & 7) - 1 < 6U && (place >> 6) - 1 < 6U;
   for (int n = 0; n < 27; ++n) {
     const int d[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-    const VoxelKey neighbour = inner ? voxel + static_cast<VoxelKey>(d[0] + 8 * d[1] + 64 * d[2]) : bone.find(c.i + d[0], c.j + d[1], c.k + d[2]);
+    const VoxelKey neighbour =
+        inner ? voxel + static_cast<VoxelKey>(d[0] + 8 * d[1] + 64 * d[2]) : bone.find(c.i + d[0], c.j + d[1], c.k + d[2]);
     const int value = neighbour == BrickGrid::kNone ? 0 : before_[neighbour];
     for (int a = 0; a < 3; ++a) slope[a] += d[a] * value * (2 >> (d[(a + 1) % 3] & 1)) * (2 >> (d[(a + 2) % 3] & 1));
   }
@@ -187,8 +188,8 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
     }
     Slot& s = slots_[slot];
     if (!waits) {
-      const overlap::Shape shape{{head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope,
-                                 head_.slope_run, 0, head_.ball};
+      const overlap::Shape shape{
+          {head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
       s.left = overlap::grain_functions().take(shape, at, parts_, &grains_[slot * words_]);
     }
     if (s.left > 0) return static_cast<float>(s.left) * s.grain;

@@ -101,8 +101,8 @@ const Tables& tables() {
 
 // The voxels of a brick and 2 beyond it on each side.
 constexpr int kPad = 2, kBlock = BrickGrid::kEdge + 2 * kPad;
-// A crossing keeps this share of its edge away from both ends. Else a voxel of just the surface's density would draw the vertices of all cells
-// around it together; so, no two vertices are nearer than two thirds of this, and single precision keeps them apart.
+// A crossing keeps this share of its edge away from both ends. Else a voxel of just the surface's density would draw the vertices of all
+// cells around it together; so, no two vertices are nearer than two thirds of this, and single precision keeps them apart.
 constexpr float kFromEnds = 0.01F;
 constexpr int kCells = BrickGrid::kEdge + 1;  // cells -1 .. 7 along each axis can hold vertices of this brick
 
@@ -438,8 +438,8 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   result.bone_mm3 = wanted * voxel_mm3;
   if (!(densest > 0)) return result;
 
-  // Volume falls as density rises: from one half by the surface's own area, then between the nearest from above and from below (the Illinois
-  // rule). Where it jumps, as at a new speck, the nearest that was met stands.
+  // Volume falls as density rises: from one half by the surface's own area, then between the nearest from above and from below (the
+  // Illinois rule). Where it jumps, as at a new speck, the nearest that was met stands.
   struct Point {
     float iso;
     double off;
@@ -456,7 +456,8 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
   const Point half = look(kHalf);
   const double step = 1.5 * half.off / std::max(area_at_half, 1e-9);
   Point a = half, b = half;
-  for (float reach = static_cast<float>(std::copysign(std::clamp(std::abs(step), 1e-4, 0.5), step)); std::abs(half.off) > kEnough * wanted; reach *= 3) {
+  for (float reach = static_cast<float>(std::copysign(std::clamp(std::abs(step), 1e-4, 0.5), step)); std::abs(half.off) > kEnough * wanted;
+       reach *= 3) {
     b = look(std::clamp(kHalf + reach, low, high));
     if ((b.off > 0) != (half.off > 0) || b.iso == low || b.iso == high) break;
     a = b;

@@ -25,8 +25,8 @@ ordered_json triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
-constexpr const char* kNext = ".osteo-next";            // complete, being moved to its places
-constexpr const char* kStaging = ".osteo-tmp-case-";    // in the making, or dead
+constexpr const char* kNext = ".osteo-next";          // complete, being moved to its places
+constexpr const char* kStaging = ".osteo-tmp-case-";  // in the making, or dead
 
 // Empty when there is none.
 ordered_json manifest_of(const fs::path& folder) {
@@ -48,7 +48,8 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
 void move_over(const fs::path& from, const fs::path& to) {
   std::error_code ec;
   fs::rename(from, to, ec);
-  if (ec) throw Error(ExitCode::cannot_write, "cannot write '" + to.string() + "': " + ec.message(), "choose a folder that you may write to");
+  if (ec)
+    throw Error(ExitCode::cannot_write, "cannot write '" + to.string() + "': " + ec.message(), "choose a folder that you may write to");
 }
 
 // Moves a complete next state to its places; may be cut anywhere and begun again. The manifest goes last. Needs the lock.
@@ -156,7 +157,9 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
       if (name == kNext || name.starts_with(".osteo-tmp-")) continue;
       // Outputs lie beside their records; the verdict on a refused scan, a damaged manifest and the record of a lost output stand alone.
       bool made = fs::exists(provenance_path(entry.path()));
-      for (const auto& [ending, word] : {std::pair{"import.json", "\"osteotome_verdict\""}, {"manifest.json", "\"osteotome_case\""}, {".prov.json", "\"output_hash\""}}) {
+      for (const auto& [ending, word] : {std::pair{"import.json", "\"osteotome_verdict\""},
+                                         {"manifest.json", "\"osteotome_case\""},
+                                         {".prov.json", "\"output_hash\""}}) {
         if (!made && name.ends_with(ending) && entry.is_regular_file()) made = read_text(entry.path()).find(word) != std::string::npos;
       }
       if (made) ours.insert({name, name + ".prov.json"});
@@ -181,7 +184,8 @@ void recall_facts(const fs::path& folder, std::vector<NodeResult>& results) {
   for (NodeResult& r : results) {
     if (!r.reused || !r.report.empty()) continue;
     for (const auto& step : manifest.value("steps", ordered_json::array())) {
-      if (step.value("id", "") == r.id && step.value("key", "") == r.key) r.report = report_from_json(step.value("report", ordered_json::object()));
+      if (step.value("id", "") == r.id && step.value("key", "") == r.key)
+        r.report = report_from_json(step.value("report", ordered_json::object()));
     }
   }
 }

@@ -60,8 +60,7 @@ Script make_default_script(const World& world, bool left, int tool, double secon
     const double circle = rim * (1 - sway);
     const portable::SinCos turn = portable::sin_cos_turns(1.2 * (t - first));
     const double depth = 3 + std::min(9.0, 0.12 * seconds + 1) * share;
-    script.waypoints.push_back(
-        {t, *entry + out * (radius - depth) + u * (circle * turn.cos) + v * (circle * turn.sin), true});
+    script.waypoints.push_back({t, *entry + out * (radius - depth) + u * (circle * turn.cos) + v * (circle * turn.sin), true});
   }
   script.waypoints.push_back({last + step, *entry + out * (radius + 2), false});
   script.waypoints.push_back({seconds, *entry + out * (radius + 8), false});

@@ -156,7 +156,8 @@ void Follower::catch_up() {
     for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
       if (bone.value(v) == d.bone.value(v)) continue;
       // What the coarse grid holds of a finer region is counted there.
-      const Vec3 at = bone.frame().world_from_index({double(bone.coordinate(v).i), double(bone.coordinate(v).j), double(bone.coordinate(v).k)});
+      const Vec3 at =
+          bone.frame().world_from_index({double(bone.coordinate(v).i), double(bone.coordinate(v).j), double(bone.coordinate(v).k)});
       const bool of_region = !d.of_region && std::any_of(dusty_.begin(), dusty_.end(), [&](const auto& other) {
         const Vec3 x = other.second.bone.frame().index_from_world(at);
         return other.second.of_region && other.second.bone.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),

@@ -15,11 +15,11 @@ namespace osteo {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kClearMm = 0.4;   // on the way in or out of a cavity, where it has that much room
+constexpr double kClearMm = 0.4;     // on the way in or out of a cavity, where it has that much room
 constexpr double kPressedMm = -0.3;  // a tool that was pressed into bone, and yields
-constexpr double kFarMm = 4;       // from there on it may go quickly
-constexpr double kOutsideMm = 8;   // beyond the ball around the bone
-constexpr double kLookMm = 0.5;    // between two looks along a way
+constexpr double kFarMm = 4;         // from there on it may go quickly
+constexpr double kOutsideMm = 8;     // beyond the ball around the bone
+constexpr double kLookMm = 0.5;      // between two looks along a way
 
 // Rings around a round cone, `spacing_mm` apart.
 void add_skin(const RoundCone& c, double spacing_mm, ToolSkin& skin) {
@@ -132,7 +132,8 @@ FreeWays::FreeWays(const World& world, ToolSkin tool) : tool_(std::move(tool)) {
     }
     if (bone.brick_count() == 0) continue;
     b.centre_mm = (own_lo + own_hi) * 0.5;
-    for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) b.radius_mm = std::max(b.radius_mm, length(middle(brick) - b.centre_mm));
+    for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick)
+      b.radius_mm = std::max(b.radius_mm, length(middle(brick) - b.centre_mm));
     b.radius_mm += 4 * length(bone.frame().spacing_mm);
     const Vec3 at = placed.world_from_body(b.centre_mm);
     for (std::size_t a = 0; a < 3; ++a) {
@@ -264,7 +265,8 @@ std::optional<FreeWays::Poses> FreeWays::search_out(const HandPose& from, double
       Poses straight;
       for (std::size_t i = 0; i + 1 < path.size();) {
         std::size_t next = path.size() - 1;
-        while (next > i + 1 && !free_leg(path[i], path[next], beginning(path[i].at_mm) ? near_margin : far_margin)) next = i + (next - i) / 2;
+        while (next > i + 1 && !free_leg(path[i], path[next], beginning(path[i].at_mm) ? near_margin : far_margin))
+          next = i + (next - i) / 2;
         straight.push_back(path[next]);
         i = next;
       }
@@ -319,7 +321,8 @@ std::optional<FreeWays::Poses> FreeWays::across(const HandPose& from, const Hand
       }
       poses.push_back(to);
       HandPose last = from;
-      const bool all_free = std::all_of(poses.begin(), poses.end(), [&](const HandPose& p) { return free_leg(std::exchange(last, p), p, margin); });
+      const bool all_free =
+          std::all_of(poses.begin(), poses.end(), [&](const HandPose& p) { return free_leg(std::exchange(last, p), p, margin); });
       if (all_free) return poses;
     }
   }

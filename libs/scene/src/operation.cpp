@@ -52,7 +52,8 @@ World::Effect Operation::act(const SceneAction& action, const Done& done, const 
 }
 
 std::optional<World::Effect> Operation::act_live(const SceneAction& action, const std::function<bool()>& running,
-                                                 const std::function<void()>& held, const Done& done, const World::ComponentsOf& components) {
+                                                 const std::function<void()>& held, const Done& done,
+                                                 const World::ComponentsOf& components) {
   const auto wait = [&] {
     while (!servo_.taken() && running()) std::this_thread::sleep_for(std::chrono::microseconds(100));
   };

@@ -96,7 +96,8 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
   }
 }
 
-std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string, std::optional<std::string>>& given, bool other_structures) {
+std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string, std::optional<std::string>>& given,
+                                          bool other_structures) {
   std::vector<RecipeChange> changes;
   const auto set = [&](const std::string& name, const std::optional<std::string>& to, const std::string& why) {
     const auto it = r.settings.find(name);
@@ -125,7 +126,8 @@ std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string,
   }
   if (other_structures) dropped.emplace_back("names", "they belonged to the other label map");
   const auto preset = given.find("preset");
-  if (preset != given.end() && preset->second && *preset->second != "fixed") dropped.emplace_back("lower", "the preset finds the threshold");
+  if (preset != given.end() && preset->second && *preset->second != "fixed")
+    dropped.emplace_back("lower", "the preset finds the threshold");
   if (given.contains("lower") && given.at("lower")) dropped.emplace_back("preset", "it would not use --lower");
   for (const auto& [name, value] : given) set(name, value, "");
   for (const auto& [name, why] : dropped) {

@@ -121,7 +121,8 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   const Gap* const known = session.bone_known_until();
   apply(session, from_changes, done, known ? known->changes_before : session.changes.size(),
         known ? known->actions_before : session.actions.size());
-  for (std::size_t t = repeated.size(); t < session.ticks.size(); ++t) result.removed_mm3 += static_cast<double>(session.ticks[t].removed_mm3);
+  for (std::size_t t = repeated.size(); t < session.ticks.size(); ++t)
+    result.removed_mm3 += static_cast<double>(session.ticks[t].removed_mm3);
   result.bone_hash = from_changes.hash();
   const Follower surfaces(from_changes, {true, false, false}, session.header.rate_hz, context);
   result.surface_hash = surfaces.surface_hash();
@@ -134,7 +135,8 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   if (session.end && known == nullptr) {
     if (session.end->bone_hash != result.bone_hash) differ("the bone came out differently");
     if (!session.end->surface_hash.empty() && session.end->surface_hash != result.surface_hash) differ("the surface came out differently");
-    if (!session.end->dust_hash.empty() && gap == nullptr && session.end->dust_hash != result.dust_hash) differ("the dust came out differently");
+    if (!session.end->dust_hash.empty() && gap == nullptr && session.end->dust_hash != result.dust_hash)
+      differ("the dust came out differently");
   }
   result.world = std::make_shared<const World>(std::move(from_changes));
   result.identical = result.difference.empty();

@@ -32,7 +32,8 @@ Box box_of(const World& world) {
     for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
       const Ijk o = bone.brick_coordinate(b);
       for (int c = 0; c < 8; ++c)
-        box.add(placed.world_from_body(bone.frame().world_from_index({8.0 * (o.i + (c & 1)) - 0.5, 8.0 * (o.j + (c >> 1 & 1)) - 0.5, 8.0 * (o.k + (c >> 2)) - 0.5})));
+        box.add(placed.world_from_body(
+            bone.frame().world_from_index({8.0 * (o.i + (c & 1)) - 0.5, 8.0 * (o.j + (c >> 1 & 1)) - 0.5, 8.0 * (o.k + (c >> 2)) - 0.5})));
     }
   }
   return box;
@@ -61,9 +62,10 @@ std::vector<std::string> doubts_about(const Script& script, const World& world, 
                      " mm of the origin: are the script's points in metres? They are taken as millimetres");
   } else if (near > kFarMm) {
     doubts.push_back("the burr never comes nearer than " + format_number(std::round(near)) +
-                     " mm to the bone: points are LPS mm of the case, whose bone lies between " + format_number(std::round(box.lo.x)) + ", " +
-                     format_number(std::round(box.lo.y)) + ", " + format_number(std::round(box.lo.z)) + " and " +
-                     format_number(std::round(box.hi.x)) + ", " + format_number(std::round(box.hi.y)) + ", " + format_number(std::round(box.hi.z)));
+                     " mm to the bone: points are LPS mm of the case, whose bone lies between " + format_number(std::round(box.lo.x)) +
+                     ", " + format_number(std::round(box.lo.y)) + ", " + format_number(std::round(box.lo.z)) + " and " +
+                     format_number(std::round(box.hi.x)) + ", " + format_number(std::round(box.hi.y)) + ", " +
+                     format_number(std::round(box.hi.z)));
   }
   const auto cleans = [](const Script::Deed& d) { return d.action.is(ActionKind::suction) || d.action.is(ActionKind::irrigate); };
   if (!dust && std::any_of(script.deeds.begin(), script.deeds.end(), cleans))

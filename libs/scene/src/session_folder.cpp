@@ -201,8 +201,11 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (s.unusable_poses > 0) j["pose_unusable_s"] = static_cast<double>(s.unusable_poses) / rate_hz;
   // What was asked for and not done, or not so.
   for (const ActionNote& n : s.notes) {
-    j[n.done ? "actions_done_otherwise" : "actions_refused"].push_back(
-        {{"tick", n.tick}, {"t_s", static_cast<double>(n.tick) / rate_hz}, {"action", name_of(n.kind)}, {"why", n.why}, {"times", n.times}});
+    j[n.done ? "actions_done_otherwise" : "actions_refused"].push_back({{"tick", n.tick},
+                                                                        {"t_s", static_cast<double>(n.tick) / rate_hz},
+                                                                        {"action", name_of(n.kind)},
+                                                                        {"why", n.why},
+                                                                        {"times", n.times}});
   }
   if (!s.warnings.empty()) j["warnings"] = s.warnings;
   if (!s.pieces.empty()) {

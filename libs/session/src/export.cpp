@@ -10,11 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "mcap_writer.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
 #include "osteo/bone/burr.h"
-#include "mcap_writer.h"
 
 namespace osteo {
 namespace {
@@ -152,8 +152,8 @@ void actions_csv(const Session& s, OutFile& out) {
   out.write(line + "\n");
   for (const RecordedAction& r : s.actions) {
     const SceneAction& a = r.action;
-    line = format_number(seconds_of(s, a.tick)) + "," + std::to_string(a.tick) + "," + std::string(name_of(static_cast<ActionKind>(a.kind))) +
-           "," + who(a.body) + "," + who(a.other) + "," + who(item_of(a));
+    line = format_number(seconds_of(s, a.tick)) + "," + std::to_string(a.tick) + "," +
+           std::string(name_of(static_cast<ActionKind>(a.kind))) + "," + who(a.body) + "," + who(a.other) + "," + who(item_of(a));
     for (const double v : a.values) line += "," + format_number(v);
     out.write(line + "\n");
   }
@@ -173,7 +173,8 @@ void mcap(const Session& s, OutFile& out, const Context& context) {
   ordered_json actions = schema("osteotome.Action"), gaps = schema("osteotome.Gap");
   actions["properties"]["tick"] = {{"type", "integer"}};
   actions["properties"]["action"] = {{"type", "string"}};
-  for (const char* name : {"piece", "second_piece", "item"}) actions["properties"][name] = {{"type", ordered_json::array({"integer", "null"})}};
+  for (const char* name : {"piece", "second_piece", "item"})
+    actions["properties"][name] = {{"type", ordered_json::array({"integer", "null"})}};
   actions["properties"]["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}};
   for (const char* name : {"first_tick", "ticks", "bytes"}) gaps["properties"][name] = {{"type", "integer"}};
   gaps["properties"]["bone_lost"] = {{"type", "boolean"}};
@@ -188,14 +189,21 @@ void mcap(const Session& s, OutFile& out, const Context& context) {
   const auto up_to = [&](std::uint64_t tick) {
     for (; gap < s.gaps.size() && s.gaps[gap].first_tick <= tick; ++gap) {
       const Gap& g = s.gaps[gap];
-      const ordered_json j{{"time_s", seconds_of(s, g.first_tick)}, {"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bytes", g.bytes}, {"bone_lost", g.bone_lost}};
+      const ordered_json j{{"time_s", seconds_of(s, g.first_tick)},
+                           {"first_tick", g.first_tick},
+                           {"ticks", g.ticks},
+                           {"bytes", g.bytes},
+                           {"bone_lost", g.bone_lost}};
       file.message(on_gaps, ns(g.first_tick), j.dump());
     }
     for (; action < s.actions.size() && s.actions[action].action.tick <= tick; ++action) {
       const SceneAction& a = s.actions[action].action;
-      const ordered_json j{{"time_s", seconds_of(s, a.tick)},   {"tick", a.tick},
-                           {"action", name_of(static_cast<ActionKind>(a.kind))}, {"piece", or_null(a.body)},
-                           {"second_piece", or_null(a.other)},  {"item", or_null(item_of(a))},
+      const ordered_json j{{"time_s", seconds_of(s, a.tick)},
+                           {"tick", a.tick},
+                           {"action", name_of(static_cast<ActionKind>(a.kind))},
+                           {"piece", or_null(a.body)},
+                           {"second_piece", or_null(a.other)},
+                           {"item", or_null(item_of(a))},
                            {"values", a.values}};
       file.message(on_actions, ns(a.tick), j.dump());
     }

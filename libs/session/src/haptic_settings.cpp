@@ -107,7 +107,10 @@ std::string haptic_settings_json(const HapticSetup& setup) {
     if (!f.doc.unit.empty()) text += ", " + std::string(f.doc.unit);
     text += "\n";
   }
-  text += std::string("  \"hardness\": ") + (!setup.hardness ? "\"auto\"" : *setup.hardness ? "true" : "false") +
+  text += std::string("  \"hardness\": ") +
+          (!setup.hardness   ? "\"auto\""
+           : *setup.hardness ? "true"
+                             : "false") +
           "  // dense bone resists the burr more, by the HU of the case; auto: where it keeps them; false: all bone alike\n}\n";
   return text;
 }

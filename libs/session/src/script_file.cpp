@@ -156,7 +156,9 @@ struct Attach {
 struct Detach {
   static constexpr const char *kName = "detach", *kHelp = "take a plate off";
   int number = 1;
-  static void describe(Detach& p, auto& visit) { visit({"number", "of the plate, in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number); }
+  static void describe(Detach& p, auto& visit) {
+    visit({"number", "of the plate, in the order of fixing, from 1", "", 1, kMostPieces, true}, p.number);
+  }
 };
 
 struct Open {
@@ -239,7 +241,8 @@ class ScriptReader {
       const std::size_t before = script_.deeds.size();
       action(actions->items[a], where);
       if (before > 0 && script_.deeds[before].t_s < script_.deeds[before - 1].t_s)
-        throw file_.wrong(actions->items[a], where + ": it begins before the one above has ended", "actions stand in the order of their times");
+        throw file_.wrong(actions->items[a], where + ": it begins before the one above has ended",
+                          "actions stand in the order of their times");
     }
     if (!(script_.seconds() > 0)) throw file_.wrong(waypoints, "the script takes no time", "give a last waypoint with \"t_s\" above 0");
   }
@@ -269,7 +272,8 @@ class ScriptReader {
     const Vec3 v = vec(t);
     const JsonValue* const at = object.find(key);
     if (!(length(v) > 1e-9))
-      throw file_.wrong(at != nullptr ? *at : object, (where.empty() ? "" : where + ": ") + "\"" + key + "\" is a direction and has no length");
+      throw file_.wrong(at != nullptr ? *at : object,
+                        (where.empty() ? "" : where + ": ") + "\"" + key + "\" is a direction and has no length");
     return normalized(v);
   }
   // A plate's frame from where its x and z axes point; z counts, x is taken at right angles to it.
@@ -311,8 +315,7 @@ class ScriptReader {
       const portable::SinCos turn = portable::sin_cos_turns(c.turns_per_s * t);
       // A bowl: less deep towards its rim.
       const double depth = c.depth_mm * share * (1 - 0.4 * (circle / c.radius_mm) * (circle / c.radius_mm));
-      script_.waypoints.push_back(
-          {begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
+      script_.waypoints.push_back({begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
     }
   }
 
@@ -352,7 +355,8 @@ class ScriptReader {
   }
 
   void act(double t, const Saw& s, const JsonValue& j, const std::string& where) {
-    SawCut cut{vec(s.at_mm), direction(j, where, "normal", s.normal), direction(j, where, "along", s.along), s.kerf_mm, s.length_mm, s.depth_mm};
+    SawCut cut{vec(s.at_mm), direction(j, where, "normal", s.normal), direction(j, where, "along", s.along), s.kerf_mm, s.length_mm,
+               s.depth_mm};
     if (j.find("along") != nullptr && length(cross(cut.normal, cut.along)) < 1e-6)
       throw file_.wrong(j, where + ": \"along\" lies along \"normal\"", "the length of the blade lies across its normal");
     // As it is written: the cut takes any length.
@@ -375,7 +379,8 @@ class ScriptReader {
     const Vec3 axis = direction(j, where, "axis", m.axis), about = vec(m.about_mm), from = vec(now.shift), to = vec(m.shift_mm);
     steps(t, m.over_s, [&](double share) {
       const double turn = now.turn_deg + (m.turn_deg - now.turn_deg) * share;
-      return SceneAction::move(piece, RigidTransform{{}, from + (to - from) * share} * rotation_about(about, axis, turn * std::numbers::pi / 180));
+      return SceneAction::move(piece,
+                               RigidTransform{{}, from + (to - from) * share} * rotation_about(about, axis, turn * std::numbers::pi / 180));
     });
     now = {m.shift_mm, m.turn_deg};
   }
@@ -383,15 +388,19 @@ class ScriptReader {
     return static_cast<std::uint32_t>(located(*j.find("plate"), where, [&] { return plate_index(name); }));
   }
   void act(double t, const Grip& g, const JsonValue& j, const std::string& where) {
-    add(t, SceneAction::grip(g.plate.empty() ? SceneAction::kNobody : plate(j, where, g.plate), {axes_of(j, where, g.x, g.z), vec(g.shift_mm)}));
+    add(t, SceneAction::grip(g.plate.empty() ? SceneAction::kNobody : plate(j, where, g.plate),
+                             {axes_of(j, where, g.x, g.z), vec(g.shift_mm)}));
   }
   void act(double t, const Attach& a, const JsonValue& j, const std::string& where) {
     if (a.pieces.empty() || a.pieces.size() > 2 || (a.pieces.size() == 2 && a.pieces[0] == a.pieces[1]))
       throw file_.wrong(*j.find("pieces"), where + ": \"pieces\" are one, or two that are not the same");
-    add(t, SceneAction::attach(plate(j, where, a.plate), {axes_of(j, where, a.x, a.z), vec(a.at_mm)}, static_cast<std::uint32_t>(a.pieces[0]),
-                               a.pieces.size() > 1 ? static_cast<std::uint32_t>(a.pieces[1]) : SceneAction::kNobody));
+    add(t,
+        SceneAction::attach(plate(j, where, a.plate), {axes_of(j, where, a.x, a.z), vec(a.at_mm)}, static_cast<std::uint32_t>(a.pieces[0]),
+                            a.pieces.size() > 1 ? static_cast<std::uint32_t>(a.pieces[1]) : SceneAction::kNobody));
   }
-  void act(double t, const Detach& d, const JsonValue&, const std::string&) { add(t, SceneAction::detach(static_cast<std::uint32_t>(d.number))); }
+  void act(double t, const Detach& d, const JsonValue&, const std::string&) {
+    add(t, SceneAction::detach(static_cast<std::uint32_t>(d.number)));
+  }
   void act(double t, const Open& o, const JsonValue&, const std::string&) {
     const auto number = static_cast<std::uint32_t>(o.number);
     double& now = opening_[number];
@@ -426,7 +435,8 @@ class ScriptReader {
 template <class T>
 ordered_json object_schema() {
   T part;
-  ordered_json s{{"type", "object"}, {"additionalProperties", false}, {"required", ordered_json::array()}, {"properties", ordered_json::object()}};
+  ordered_json s{
+      {"type", "object"}, {"additionalProperties", false}, {"required", ordered_json::array()}, {"properties", ordered_json::object()}};
   for (const FieldRef& f : fields_in(part)) {
     s["properties"][std::string(f.doc.name)] = ordered_json::parse(field_schema(f));
     if (f.doc.needed) s["required"].push_back(f.doc.name);

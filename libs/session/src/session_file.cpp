@@ -374,13 +374,15 @@ std::vector<std::string> losses(const Session& s) {
   std::vector<std::string> lines;
   for (const Gap& g : s.gaps) {
     if (g.bytes > 0) {
-      lines.push_back("damaged at byte " + std::to_string(g.at_byte) + ": " + count(g.bytes, "byte") + " cannot be read, " +
-                      (g.ticks > 0 ? ticks_of(g) + " missing" : "with changes, actions or the end of ticks around " + std::to_string(g.first_tick)));
+      lines.push_back(
+          "damaged at byte " + std::to_string(g.at_byte) + ": " + count(g.bytes, "byte") + " cannot be read, " +
+          (g.ticks > 0 ? ticks_of(g) + " missing" : "with changes, actions or the end of ticks around " + std::to_string(g.first_tick)));
     } else {
-      lines.push_back((g.ticks > 0 ? ticks_of(g) + " (" + count(g.ticks, "tick") + ")" : "actions before tick " + std::to_string(g.first_tick)) +
-                      " were not recorded, since " +
-                      (g.bone_lost ? "the recorder did not come to run; what they changed is missing too"
-                                   : "the disk did not keep up; what they changed and what was done meanwhile is there"));
+      lines.push_back(
+          (g.ticks > 0 ? ticks_of(g) + " (" + count(g.ticks, "tick") + ")" : "actions before tick " + std::to_string(g.first_tick)) +
+          " were not recorded, since " +
+          (g.bone_lost ? "the recorder did not come to run; what they changed is missing too"
+                       : "the disk did not keep up; what they changed and what was done meanwhile is there"));
     }
   }
   if (s.torn_bytes > 0) lines.push_back("cut at its end: " + count(s.torn_bytes, "byte") + " behind the last whole frame left out");
@@ -395,7 +397,8 @@ Session read_session(const fs::path& path, Damage damage) {
   const auto header = frame_at(bytes, 0);
   if (!header) {
     const bool ours = bytes.size() >= sizeof kMagic && std::memcmp(bytes.data(), &kMagic, sizeof kMagic) == 0;
-    throw Error(ExitCode::corrupt, name + (ours ? " is damaged at byte 0, in its header, or was cut before that ended" : " is not a session file"));
+    throw Error(ExitCode::corrupt,
+                name + (ours ? " is damaged at byte 0, in its header, or was cut before that ended" : " is not a session file"));
   }
   std::size_t at = header->end;
   try {

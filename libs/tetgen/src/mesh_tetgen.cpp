@@ -44,10 +44,12 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
     tetrahedralize(detect, &in, &crossing);
     if (crossing.numberoftrifaces > 0)
       throw Error(ExitCode::failed,
-                  "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) + " triangles of this one do",
+                  "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) +
+                      " triangles of this one do",
                   advice);
   } catch (const int code) {
-    throw Error(ExitCode::failed, "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")", advice);
+    throw Error(ExitCode::failed, "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")",
+                advice);
   }
   std::string switches = "pQq" + format_number(options.radius_edge_ratio);
   if (options.min_dihedral_deg > 0) switches += "/" + format_number(options.min_dihedral_deg);

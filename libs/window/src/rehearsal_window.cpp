@@ -32,9 +32,9 @@
 #include "keys.h"
 #include "osteo/base/error.h"
 #include "osteo/io/surface_io.h"
+#include "osteo/scene/free_ways.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
-#include "osteo/scene/free_ways.h"
 #include "osteo/view/world_view.h"
 #include "scene_tools.h"
 #include "status_panel.h"
@@ -180,10 +180,10 @@ class RehearsalWindow {
     const bool saved = !save_first || guarded([&] { actions_.save(); });
     if (!saved) lost_ = failure_;
     const bool begun = saved && guarded([&] {
-      goal_ = actions_.begin(from_case, {towards_eye(), wanted_axis(), tool_});
-      axis_ = from_floats(goal_.axis);
-      new_bone();
-    });
+                         goal_ = actions_.begin(from_case, {towards_eye(), wanted_axis(), tool_});
+                         axis_ = from_floats(goal_.axis);
+                         new_bone();
+                       });
     return begun;
   }
 
@@ -358,7 +358,9 @@ class RehearsalWindow {
         const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
         char far[80];
         std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
-        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there" : gap > 6 ? far : "drill brought to the bone";
+        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there"
+                         : gap > 6 ? far
+                                   : "drill brought to the bone";
         go(Leading::Stage::on_the_way, a.way, a.end);
       } else {
         const HandPose to = waiting(ways);
@@ -507,7 +509,8 @@ class RehearsalWindow {
     ImGui::TextWrapped("%s", failure_->what());
     if (!failure_->advice().empty()) ImGui::TextWrapped("%s", failure_->advice().c_str());
     ImGui::Separator();
-    if (const auto folder = actions_.folder(); !folder.empty()) ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
+    if (const auto folder = actions_.folder(); !folder.empty())
+      ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
     bool go_on = ImGui::Button("Go on from there (F5)", {-1, 0});
     bool anew = ImGui::Button("Begin anew from the case (R)", {-1, 0});
     if (ImGui::Button("Close (Q)", {-1, 0})) quit_ = true;
@@ -529,8 +532,10 @@ class RehearsalWindow {
       if (wanted || on) rehearsal.act(wanted ? with : without);
       on = wanted;
     };
-    say_once(keyboard_.held(Command::suck), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS), SceneAction::suction(at, kNozzleMm, 0));
-    say_once(keyboard_.held(Command::wash), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS), SceneAction::irrigate(at, kSprayMm, 0));
+    say_once(keyboard_.held(Command::suck), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS),
+             SceneAction::suction(at, kNozzleMm, 0));
+    say_once(keyboard_.held(Command::wash), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS),
+             SceneAction::irrigate(at, kSprayMm, 0));
   }
   void place_tool(const TickRecord& tick) {
     const Vec3 axis = normalized(from_floats(tick.device.axis));

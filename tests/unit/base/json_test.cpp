@@ -19,7 +19,10 @@ std::string refusal(const std::string& text) {
 
 TEST(Json, EveryValueKnowsItsLine) {
   // Numbers end with the character behind them: that may be the end of the line.
-  const JsonFile file("{ // a comment\n \"a\": 1\n,\"b\": [2,\n 3\n ],\n\n \"c\": { \"d\": \"x\", /* and\n another */ \"e\": -4.5e2\n} ,\"f\": true,\"g\":null}", "f.json");
+  const JsonFile file(
+      "{ // a comment\n \"a\": 1\n,\"b\": [2,\n 3\n ],\n\n \"c\": { \"d\": \"x\", /* and\n another */ \"e\": -4.5e2\n} ,\"f\": "
+      "true,\"g\":null}",
+      "f.json");
   const JsonValue& r = file.root();
   ASSERT_EQ(r.members.size(), 5u);
   EXPECT_EQ(r.line, 1u);
@@ -38,8 +41,13 @@ TEST(Json, EveryValueKnowsItsLine) {
 }
 
 TEST(Json, WhatIsNoJsonIsToldWithItsLineAndWithoutTheLibrarysName) {
-  for (const auto& [text, line] : {std::pair{"{\n\n \"a\": }", "line 3"}, {"", "line 1"}, {"{\n\"a\": 1\n", "line 2"}, {"{\"a\": 1}\n{}", "line 2"},
-                                   {"{\n\"a\": NaN}", "line 2"}, {"{\n\"a\": 1e999}", "line 2"}, {"{\n\"a\": 'x'}", "line 2"}}) {
+  for (const auto& [text, line] : {std::pair{"{\n\n \"a\": }", "line 3"},
+                                   {"", "line 1"},
+                                   {"{\n\"a\": 1\n", "line 2"},
+                                   {"{\"a\": 1}\n{}", "line 2"},
+                                   {"{\n\"a\": NaN}", "line 2"},
+                                   {"{\n\"a\": 1e999}", "line 2"},
+                                   {"{\n\"a\": 'x'}", "line 2"}}) {
     const std::string what = refusal(text);
     EXPECT_NE(what.find(std::string("'f.json' ") + line + ": this is not valid JSON"), std::string::npos) << what;
     EXPECT_EQ(what.find("json.exception"), std::string::npos) << what;

@@ -32,32 +32,63 @@ double worst(double lo, double hi, Ours ours, Theirs theirs, bool relative = fal
 TEST(PortableMath, IsAsExactAsItSays) {
   using namespace portable;
   for (const double range : {0.8, 7.0, 1000.0, 1e6}) {
-    EXPECT_LT(worst(-range, range, [](double x) { return sin_cos(x).sin; }, [](long double x) { return std::sin(x); }), 2e-16) << range;
-    EXPECT_LT(worst(-range, range, [](double x) { return sin_cos(x).cos; }, [](long double x) { return std::cos(x); }), 2e-16) << range;
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return sin_cos(x).sin; }, [](long double x) { return std::sin(x); }),
+              2e-16)
+        << range;
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return sin_cos(x).cos; }, [](long double x) { return std::cos(x); }),
+              2e-16)
+        << range;
   }
   for (const double range : {1.0, 1000.0}) {
-    EXPECT_LT(worst(-range, range, [](double x) { return sin_cos_turns(x).sin; }, [](long double x) { return std::sin(2 * kPi * (x - std::round(x))); }), 3e-16);
-    EXPECT_LT(worst(-range, range, [](double x) { return sin_cos_turns(x).cos; }, [](long double x) { return std::cos(2 * kPi * (x - std::round(x))); }), 3e-16);
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return sin_cos_turns(x).sin; },
+                  [](long double x) { return std::sin(2 * kPi * (x - std::round(x))); }),
+              3e-16);
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return sin_cos_turns(x).cos; },
+                  [](long double x) { return std::cos(2 * kPi * (x - std::round(x))); }),
+              3e-16);
   }
-  EXPECT_LT(worst(-1, 1, [](double x) { return portable::acos(x); }, [](long double x) { return std::acos(x); }), 1e-15);
-  EXPECT_LT(worst(-1, 1, [](double x) { return portable::asin(x); }, [](long double x) { return std::asin(x); }), 5e-16);
+  EXPECT_LT(worst(
+                -1, 1, [](double x) { return portable::acos(x); }, [](long double x) { return std::acos(x); }),
+            1e-15);
+  EXPECT_LT(worst(
+                -1, 1, [](double x) { return portable::asin(x); }, [](long double x) { return std::asin(x); }),
+            5e-16);
   for (const double x : {-3.0, -1e-9, 0.0, 1e-12, 0.7, 40.0}) {
-    EXPECT_LT(worst(-50, 50, [&](double y) { return portable::atan2(y, x); }, [&](long double y) { return std::atan2(y, static_cast<long double>(x)); }),
+    EXPECT_LT(worst(
+                  -50, 50, [&](double y) { return portable::atan2(y, x); },
+                  [&](long double y) { return std::atan2(y, static_cast<long double>(x)); }),
               6e-16)
         << x;
-    EXPECT_LT(worst(-50, 50, [&](double y) { return portable::hypot(x, y); }, [&](long double y) { return std::hypot(static_cast<long double>(x), y); }, true),
+    EXPECT_LT(worst(
+                  -50, 50, [&](double y) { return portable::hypot(x, y); },
+                  [&](long double y) { return std::hypot(static_cast<long double>(x), y); }, true),
               2.3e-16)
         << x;
   }
   for (const double range : {1.0, 1e-6, 1e9, 1e300})
-    EXPECT_LT(worst(-range, range, [](double x) { return portable::cbrt(x); }, [](long double x) { return std::cbrt(x); }, true), 5e-16) << range;
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return portable::cbrt(x); }, [](long double x) { return std::cbrt(x); }, true),
+              5e-16)
+        << range;
   for (const double range : {1e-3, 1.0, 30.0, 700.0})
-    EXPECT_LT(worst(-range, range, [](double x) { return portable::exp(x); }, [](long double x) { return std::exp(x); }, true), 4e-16) << range;
-  EXPECT_LT(worst(0.3, 3, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }), 3e-16 * 28);  // down to 3e-13
-  EXPECT_LT(worst(0.9, 1.1, [](double x) { return portable::log(x) / std::max(1.0, std::abs(std::log(x))); },
-                  [](long double x) { return std::log(x) / std::max(1.0L, std::abs(std::log(x))); }),
+    EXPECT_LT(worst(
+                  -range, range, [](double x) { return portable::exp(x); }, [](long double x) { return std::exp(x); }, true),
+              4e-16)
+        << range;
+  EXPECT_LT(worst(
+                0.3, 3, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }),
+            3e-16 * 28);  // down to 3e-13
+  EXPECT_LT(worst(
+                0.9, 1.1, [](double x) { return portable::log(x) / std::max(1.0, std::abs(std::log(x))); },
+                [](long double x) { return std::log(x) / std::max(1.0L, std::abs(std::log(x))); }),
             3e-16);
-  EXPECT_LT(worst(1, 1e300, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }, true), 3e-16);
+  EXPECT_LT(worst(
+                1, 1e300, [](double x) { return portable::log(x); }, [](long double x) { return std::log(x); }, true),
+            3e-16);
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> base(0, 5), exponent(-4, 4);
   for (int n = 0; n < 200'000; ++n) {
@@ -117,8 +148,9 @@ TEST(PortableMath, BitsAreTheSameEverywhere) {
     state = state * 6364136223846793005U + 1442695040888963407U;
     const double u = static_cast<double>(state >> 11) * 0x1p-52 - 1;  // [-1, 1)
     const SinCos a = sin_cos(20 * u), b = sin_cos_turns(u);
-    for (const double v : {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3), portable::hypot(u, 0.7), portable::cbrt(u), portable::exp(9 * u),
-                           portable::log(1.5 + u), portable::pow(1.5 + u, 1.7)})
+    for (const double v :
+         {a.sin, a.cos, b.sin, b.cos, portable::acos(u), portable::asin(u), portable::atan2(u, 0.3), portable::hypot(u, 0.7),
+          portable::cbrt(u), portable::exp(9 * u), portable::log(1.5 + u), portable::pow(1.5 + u, 1.7)})
       add(v);
   }
   EXPECT_EQ(sum, 6375800630601067770U);

@@ -273,10 +273,11 @@ TEST(World, APlateIsFixedOnlyWhereBoneIsBelowIt) {
     return e.done ? std::string("fixed") : e.message;
   };
   EXPECT_NE(refused({{}, {900, 0, 4}}, 0).find("not on piece 0"), std::string::npos);
-  EXPECT_NE(refused({{}, {2, 0, 9.5}}, 0, 1).find("not on piece 0"), std::string::npos);   // 5.5 mm above
-  EXPECT_NE(refused({{}, {-11, 0, 4}}, 1).find("not on piece 1"), std::string::npos);      // on the other piece
+  EXPECT_NE(refused({{}, {2, 0, 9.5}}, 0, 1).find("not on piece 0"), std::string::npos);  // 5.5 mm above
+  EXPECT_NE(refused({{}, {-11, 0, 4}}, 1).find("not on piece 1"), std::string::npos);     // on the other piece
   EXPECT_NE(refused({{}, {-11, 0, 4}}, 0, 1).find("not on piece 1"), std::string::npos);
-  EXPECT_NE(refused(RigidTransform{{}, {2, 0, 6}} * rotation_about({}, {1, 0, 0}, std::numbers::pi), 0).find("not on"), std::string::npos);  // its back to the bone
+  EXPECT_NE(refused(RigidTransform{{}, {2, 0, 6}} * rotation_about({}, {1, 0, 0}, std::numbers::pi), 0).find("not on"),
+            std::string::npos);  // its back to the bone
   EXPECT_EQ(w.fixtures().size(), 0u);
   EXPECT_EQ(w.hash(), before);
   EXPECT_EQ(refused({{}, {2, 0, 8.5}}, 0, 1), "fixed");  // 4.5 mm above

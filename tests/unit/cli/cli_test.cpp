@@ -55,7 +55,8 @@ struct EchoCommand {
   }
   static cli::CommandInfo info() { return {"echo", "says", "Says.", {{"what", "to say", true}}, "osteo echo"}; }
   static int run(const Params& p, cli::Invocation& io) {
-    nlohmann::json j{{"text", p.text}, {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments}, {"seed", io.context.seed}};
+    nlohmann::json j{{"text", p.text},         {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments},
+                     {"seed", io.context.seed}};
     for (const auto& [k, v] : io.settings) j["settings"][k] = v;
     io.out << j.dump();
     return 0;
@@ -109,14 +110,15 @@ TEST(Cli, FlagsReachTheCommandAndItKnowsWhichWereGiven) {
 }
 
 TEST(Cli, MistakesAreUsageAndNameTheRightWord) {
-  for (const auto& [args, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{{{"echo", "--sise", "1"}, "did you mean --size?"},
-                                                                                               {{"echo", "--size", "9"}, "between 0 mm and 5 mm"},
-                                                                                               {{"echo", "--size"}, "needs a value"},
-                                                                                               {{"echo", "--no-size"}, "no flag --no-size"},
-                                                                                               {{"echo", "a", "b"}, "takes [what]"},
-                                                                                               {{"ecko"}, "did you mean 'echo'?"},
-                                                                                               {{"fail"}, "takes <document.out> (1 name), but none was given"},
-                                                                                               {{"fail", "a", "b"}, "(1 name), but 2 were given"}}) {
+  for (const auto& [args, text] :
+       std::vector<std::pair<std::vector<std::string>, std::string>>{{{"echo", "--sise", "1"}, "did you mean --size?"},
+                                                                     {{"echo", "--size", "9"}, "between 0 mm and 5 mm"},
+                                                                     {{"echo", "--size"}, "needs a value"},
+                                                                     {{"echo", "--no-size"}, "no flag --no-size"},
+                                                                     {{"echo", "a", "b"}, "takes [what]"},
+                                                                     {{"ecko"}, "did you mean 'echo'?"},
+                                                                     {{"fail"}, "takes <document.out> (1 name), but none was given"},
+                                                                     {{"fail", "a", "b"}, "(1 name), but 2 were given"}}) {
     const Said said = run(args);
     EXPECT_EQ(said.code, 2) << text;
     EXPECT_NE(said.err.find(text), std::string::npos) << said.err;

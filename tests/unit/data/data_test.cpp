@@ -18,7 +18,8 @@ Frame turned() {
 
 TEST(Frame, WorldAndIndexAreInverse) {
   const Frame f = turned();
-  for (const Vec3 ijk : {Vec3{0, 0, 0}, {3, 4, 5}, {-2.5, 7, 0.25}}) EXPECT_LT(length(f.index_from_world(f.world_from_index(ijk)) - ijk), 1e-12);
+  for (const Vec3 ijk : {Vec3{0, 0, 0}, {3, 4, 5}, {-2.5, 7, 0.25}})
+    EXPECT_LT(length(f.index_from_world(f.world_from_index(ijk)) - ijk), 1e-12);
   EXPECT_EQ(f.voxel_count(), 120U);
   EXPECT_DOUBLE_EQ(f.voxel_volume_mm3(), 1.5);
   EXPECT_LT(length(f.centre_mm() - (f.world_from_index({0, 0, 0}) + f.world_from_index({3, 4, 5})) * 0.5), 1e-12);

@@ -488,8 +488,7 @@ TEST(Hardness, TheStepFromCortexToCancellousBoneIsFelt) {
   constexpr double kNoticed = 0.10;
   const Layers alike = fed(false, 0.5, 1000), hard = fed(true, 0.5, 1000);
   std::printf("fed 1 mm/s: alike %.2f N then %.2f N (step %.0f %%); by HU %.2f N then %.2f N (step %.0f %%)\n", alike.cortex_n,
-              alike.cancellous_n,
-              100 * alike.step(), hard.cortex_n, hard.cancellous_n, 100 * hard.step());
+              alike.cancellous_n, 100 * alike.step(), hard.cortex_n, hard.cancellous_n, 100 * hard.step());
   EXPECT_LT(std::abs(alike.step()), kNoticed / 2);
   EXPECT_GT(hard.step(), 2 * kNoticed);
   EXPECT_GT(hard.step(), 0.4);  // 500 HU against 1500: two thirds, less what the hole is wider in soft bone

@@ -294,8 +294,9 @@ TEST(Fuzz, TheGuardLetsNothingThatIsNoNumberThrough) {
     const bool bad_limits = round % 8 >= 6;
     GuardParams p;
     DeviceTraits d;
-    for (double* const x : {&p.max_rate_n_per_s, &p.max_force_n, &p.max_damping_n_s_per_m, &p.contact_damping_n_s_per_m, &p.resume_s,
-                            &p.stale_ms, &p.fade_ms, &d.damping_n_s_per_m, &d.delay_s, &d.encoder_mm, &d.max_force_n, &d.max_stiffness_n_per_mm}) {
+    for (double* const x :
+         {&p.max_rate_n_per_s, &p.max_force_n, &p.max_damping_n_s_per_m, &p.contact_damping_n_s_per_m, &p.resume_s, &p.stale_ms, &p.fade_ms,
+          &d.damping_n_s_per_m, &d.delay_s, &d.encoder_mm, &d.max_force_n, &d.max_stiffness_n_per_mm}) {
       if (bad_limits && random() % 3 == 0) *x = any_bits(random);
     }
     p.passivity = random() % 2 == 0;

@@ -51,7 +51,9 @@ TEST(Removal, EveryBurrTakesWhatItSweptAndNoMore) {
       for (const double diameter : {2.0, 4.0, 7.0}) {
         const int tool = burr_index(kind, diameter, shape);
         // Tapers lie on their side, cylinders stand on their dome.
-        const Vec3 axis = shape == BurrShape::taper ? Vec3{0.2, 0.95, 0.2} : shape == BurrShape::cylinder ? Vec3{0.2, 0.1, 1} : Vec3{0.6, 0, 0.8};
+        const Vec3 axis = shape == BurrShape::taper      ? Vec3{0.2, 0.95, 0.2}
+                          : shape == BurrShape::cylinder ? Vec3{0.2, 0.1, 1}
+                                                         : Vec3{0.6, 0, 0.8};
         Path path = groove(tool, 0.35, 1, 1, 0, axis);
         const double swept = swept_mm3(path, face, 50000);
         // So slow that time suffices: the burr takes rate * force, and what is left presses less and less.
@@ -101,7 +103,8 @@ TEST(Grains, SameBitsForEveryInstructionSet) {
   for (int n = 0; n < 3000; ++n) {
     const std::uint32_t parts = n % 3 == 0 ? 1 : n % 3 == 1 ? 2 : 4;
     const float slope = n % 2 == 0 ? 0.0F : 0.2F;
-    const overlap::Shape shape{{0.6F, 0, 0.8F}, n % 4 < 2 ? 0.0F : 6.0F, 2.1F, n % 4 == 3 ? slope : 0, n % 4 == 3 ? 0.204F : 0, 0, n % 4 < 2};
+    const overlap::Shape shape{{0.6F, 0, 0.8F}, n % 4 < 2 ? 0.0F : 6.0F, 2.1F, n % 4 == 3 ? slope : 0, n % 4 == 3 ? 0.204F : 0, 0,
+                               n % 4 < 2};
     const float at[3] = {3 * u(), 3 * u(), 3 * u()}, normal[3] = {u(), u(), u()};
     std::uint64_t left[3][64];
     std::uint32_t count[3][2];

@@ -40,7 +40,8 @@ struct MakeStage {
     Frame f;
     f.dims = {4, 3, 12};
     auto v = make_voxels<std::int16_t>(f.voxel_count());
-    for (std::size_t n = 0; n < f.voxel_count(); ++n) v[n] = static_cast<std::int16_t>(n + 1000 * context.seed + static_cast<std::size_t>(p.add));
+    for (std::size_t n = 0; n < f.voxel_count(); ++n)
+      v[n] = static_cast<std::int16_t>(n + 1000 * context.seed + static_cast<std::size_t>(p.add));
     context.report("first", static_cast<std::int64_t>(v[0]));
     return {Image{f, v}, Document{"{}"}};
   }
@@ -83,7 +84,8 @@ Pipeline make_only(const fs::path& out, const std::string& add = "0") {
 
 Pipeline chain(const fs::path& folder, const std::string& add = "0") {
   Pipeline p = make_only(folder / "image.nrrd", add);
-  p.nodes.push_back({.id = "odd", .stage = "mask", .params = {}, .inputs = {{"image", {"make", "", {}}}}, .outputs = {{"mask", folder / "mask.nrrd"}}});
+  p.nodes.push_back(
+      {.id = "odd", .stage = "mask", .params = {}, .inputs = {{"image", {"make", "", {}}}}, .outputs = {{"mask", folder / "mask.nrrd"}}});
   return p;
 }
 

@@ -58,8 +58,8 @@ struct View {
   [[nodiscard]] Vec3 right() const { return cross(forward(), up()); }
   [[nodiscard]] Vec3 axis() const { return normalized(right() * 0.62 + up() * 0.45 - forward() * 0.64); }  // as the window holds a drill
 };
-const View kViews[] = {{"left", {0.94, -0.25, 0.22}},  {"right", {-0.94, -0.25, 0.22}}, {"front", {0, -1, 0.1}},
-                       {"behind", {0, 1, 0.1}},        {"above", {0, -0.05, 1}},        {"below", {0, -0.05, -1}}};
+const View kViews[] = {{"left", {0.94, -0.25, 0.22}}, {"right", {-0.94, -0.25, 0.22}}, {"front", {0, -1, 0.1}},
+                       {"behind", {0, 1, 0.1}},       {"above", {0, -0.05, 1}},        {"below", {0, -0.05, -1}}};
 
 std::optional<Vec3> seen(const World& world, Vec3 from, Vec3 direction, double reach) {
   for (double s = 0; s < reach; s += 0.25)
@@ -71,7 +71,9 @@ std::optional<Vec3> seen(const World& world, Vec3 from, Vec3 direction, double r
 class Hand {
  public:
   Hand(const World& world, const HandPose& start)
-      : device_({start.at_mm, to_floats(start.axis), 0, kTool}), renderer_(setup(), {}, 1e-3), scene_(HapticScene::of(world, renderer_.setup())) {
+      : device_({start.at_mm, to_floats(start.axis), 0, kTool}),
+        renderer_(setup(), {}, 1e-3),
+        scene_(HapticScene::of(world, renderer_.setup())) {
     renderer_.show(&scene_);
   }
   static HapticSetup setup() {
@@ -166,8 +168,10 @@ void from_six_views(const char* name, const World& world) {
   const HandWay out = ways.way(hand.pose(), ways.waiting(normalized(last.eye), last.axis()));
   EXPECT_EQ(hand.walk(out), Led::arrived) << name;
   EXPECT_EQ(hand.force_n(), 0);
-  std::printf("%s: %d ways from six views, %d put; most force %.3f N, least gap within %.1f mm of the bone seen, longest %.1f s, found in at most %.2f s\n",
-              name, walked, put, most_n, farthest, longest_s, plan_s);
+  std::printf(
+      "%s: %d ways from six views, %d put; most force %.3f N, least gap within %.1f mm of the bone seen, longest %.1f s, found in at most "
+      "%.2f s\n",
+      name, walked, put, most_n, farthest, longest_s, plan_s);
 }
 
 TEST(FreeWays, FromSixViewsOnThePhantomsHead) {

@@ -41,7 +41,8 @@ TEST(Recipe, OneChangeKeepsTheRest) {
 }
 
 TEST(Recipe, WhatBelongsToAChangedThingGoesWithItAndIsTold) {
-  const Recipe before{.settings = {{"region", "box"}, {"centre_mm", "1,2,3"}, {"size_mm", "9,9,9"}, {"preset", "cellular"}, {"names", "1=a"}}};
+  const Recipe before{
+      .settings = {{"region", "box"}, {"centre_mm", "1,2,3"}, {"size_mm", "9,9,9"}, {"preset", "cellular"}, {"names", "1=a"}}};
   Recipe r = before;
   auto changes = change_settings(r, Given{{"region", "jaw"}}, false);
   EXPECT_FALSE(r.settings.contains("centre_mm"));
@@ -109,7 +110,8 @@ TEST_F(Memory, WhatNamesAPatientIsNotInTheCase) {
 std::string manifest(const std::map<std::string, fs::path>& files) {
   std::string text;
   for (const auto& [role, path] : files) {
-    text += (text.empty() ? "" : ", ") + ("\"" + role + R"(": {"file": ")" + path.filename().string() + R"(", "hash": ")" + hash_path(path) + "\"}");
+    text += (text.empty() ? "" : ", ") +
+            ("\"" + role + R"(": {"file": ")" + path.filename().string() + R"(", "hash": ")" + hash_path(path) + "\"}");
   }
   return R"({"osteotome_case": 1, "files": {)" + text + "}}";
 }
@@ -137,9 +139,7 @@ TEST(CaseUpdate, NothingChangesBeforeTheCommit) {
   }
   EXPECT_EQ(read_text(c.folder / "bone.vdb"), "1");
   EXPECT_EQ(c.entries(), 4U);
-  {
-    CaseUpdate u(c.path() / "never");
-  }
+  { CaseUpdate u(c.path() / "never"); }
   EXPECT_FALSE(fs::exists(c.path() / "never"));
 }
 
@@ -176,9 +176,7 @@ TEST(CaseUpdate, CutCommitIsFinished) {
     put(next / "manifest.json", manifest({{"bone", next / "bone.vdb"}, {"surface", next / "surface.ply"}}));
     if (done > 0) fs::rename(next / "bone.vdb", c.folder / "bone.vdb");
     if (done > 1) fs::rename(next / "surface.ply", c.folder / "surface.ply");
-    {
-      CaseUpdate u(c.folder);
-    }
+    { CaseUpdate u(c.folder); }
     EXPECT_EQ(read_text(c.folder / "bone.vdb"), "2") << done;
     EXPECT_EQ(parse_manifest(read_text(c.folder / "manifest.json")).at("bone").hash, hash_text("2")) << done;
     EXPECT_FALSE(fs::exists(next)) << done;
@@ -203,9 +201,7 @@ TEST(CaseUpdate, WhatAKilledOneLeftGoes) {
   const CaseFolder c;
   fs::create_directory(c.folder / ".osteo-tmp-case-1");
   put(c.folder / ".osteo-tmp-case-1/bone.vdb", "half");
-  {
-    CaseUpdate u(c.folder);
-  }
+  { CaseUpdate u(c.folder); }
   EXPECT_EQ(c.entries(), 3U);
   EXPECT_TRUE(foreign_files(c.folder, {}).empty());
 }

@@ -55,7 +55,8 @@ Script strokes(double seconds) {
   Script s;
   s.axis = {0, 0.3, 0.95};
   s.waypoints.push_back({0, {4, 0, 6}, true});
-  for (double t = 0.05; t < seconds - 0.02; t += 0.05) s.waypoints.push_back({t, {4 + 2 * std::cos(9 * t), 2 * std::sin(9 * t), 5.4 - 0.5 * t}, true});
+  for (double t = 0.05; t < seconds - 0.02; t += 0.05)
+    s.waypoints.push_back({t, {4 + 2 * std::cos(9 * t), 2 * std::sin(9 * t), 5.4 - 0.5 * t}, true});
   s.waypoints.push_back({seconds, {4, 0, 9}, false});
   return s;
 }
@@ -90,7 +91,8 @@ TEST(Recording, NoActionIsLostByTheClock) {
     EXPECT_NEAR(summary.dust->added_mm3, summary.removed_mm3 + summary.sawn_mm3, 1e-3) << "what is sawn last becomes dust too";
     const Session s = read_session(file);
     std::size_t done = 0;
-    for (const RecordedAction& a : s.actions) done += a.action.is(ActionKind::saw) || a.action.is(ActionKind::move) || a.action.is(ActionKind::suction) ? 1 : 0;
+    for (const RecordedAction& a : s.actions)
+      done += a.action.is(ActionKind::saw) || a.action.is(ActionKind::move) || a.action.is(ActionKind::suction) ? 1 : 0;
     ASSERT_EQ(done, 3u) << "start " << start;
     const ReplayResult again = replay(s, world.copy(), {}, {});
     ASSERT_TRUE(again.identical) << again.difference;

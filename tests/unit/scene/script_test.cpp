@@ -72,14 +72,17 @@ TEST(ScriptedScene, ActionsAfterTheLastWaypointAreDoneWithTheDrillAtRest) {
 TEST(ScriptedScene, EveryRefusalIsInTheSummaryWithItsTime) {
   Script script = press();
   const auto mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
-  script.deeds = {{0.05, SceneAction::saw({{500, 0, 0}, {1, 0, 0}})}, {0.1, SceneAction::attach(mini, {{}, {900, 0, 4}}, 0)},
-                  {0.15, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})}, {0.2, SceneAction::detach(7)}};
+  script.deeds = {{0.05, SceneAction::saw({{500, 0, 0}, {1, 0, 0}})},
+                  {0.1, SceneAction::attach(mini, {{}, {900, 0, 4}}, 0)},
+                  {0.15, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
+                  {0.2, SceneAction::detach(7)}};
   for (int n = 0; n < 5; ++n) script.deeds.push_back({0.25 + 0.01 * n, SceneAction::move(9, {})});
   for (const bool by_the_clock : {false, true}) {
     RehearsalSummary s = run(script, by_the_clock);
     ASSERT_EQ(s.notes.size(), 4u);
     EXPECT_TRUE(s.refused());
-    const std::pair<ActionKind, std::uint64_t> expected[] = {{ActionKind::saw, 50}, {ActionKind::attach, 100}, {ActionKind::detach, 200}, {ActionKind::move, 250}};
+    const std::pair<ActionKind, std::uint64_t> expected[] = {
+        {ActionKind::saw, 50}, {ActionKind::attach, 100}, {ActionKind::detach, 200}, {ActionKind::move, 250}};
     for (std::size_t n = 0; n < 4; ++n) {
       EXPECT_EQ(s.notes[n].kind, expected[n].first);
       EXPECT_GE(s.notes[n].tick, expected[n].second);

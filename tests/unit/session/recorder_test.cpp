@@ -74,7 +74,8 @@ class Servo {
         bone[c.voxel] = c.density;
       }
       if (next % 5000 == 4999) {
-        SceneAction a = next % 2 == 0 ? SceneAction::plain(ActionKind::undo) : SceneAction::suction({1, 2, 3}, 4, static_cast<double>(next));
+        SceneAction a =
+            next % 2 == 0 ? SceneAction::plain(ActionKind::undo) : SceneAction::suction({1, 2, 3}, 4, static_cast<double>(next));
         a.tick = next;
         while (!reader_.actions.push(a)) std::this_thread::sleep_for(std::chrono::microseconds(200));
         ++actions;

@@ -261,7 +261,8 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   const std::string head = "{ \"osteotome_strokes\": 1, \"about\": \"a test\", \"$schema\": \"script.schema.json\",\n";
   const std::string burr = "  \"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 3, \"shape\": \"taper\" },\n";
   const std::string axis = "  \"axis\": [0, 0, 1],\n";
-  const std::string points = "  \"waypoints\": [ { \"t_s\": 0, \"at_mm\": [0, 0, 8], \"drill\": false },\n{ \"t_s\": 1, \"at_mm\": [0, 0, 5] } ]";
+  const std::string points =
+      "  \"waypoints\": [ { \"t_s\": 0, \"at_mm\": [0, 0, 8], \"drill\": false },\n{ \"t_s\": 1, \"at_mm\": [0, 0, 5] } ]";
   const auto message = [&](const std::string& text) -> std::string {
     fs::remove(path);
     write_file(path, text);
@@ -292,14 +293,18 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(message(head + burr + points + "}"), "1", "\"axis\" is missing");
   expect(message(head + burr + axis + "\"waypoints\": {} }"), "4", "\"waypoints\" must be as in");
   expect(message(head + burr + "  \"axis\": [0, 0, 0],\n" + points + "}"), "3", "has no length");
-  expect(message(head + "\"burr\": { \"kind\": \"tungsten\", \"diameter_mm\": 4 },\n" + axis + points + "}"), "2", "burr: \"kind\": 'tungsten' is not one of cutting, diamond");
-  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 4,\n\"shape\": \"cube\" },\n" + axis + points + "}"), "3", "'cube' is not one of ball");
+  expect(message(head + "\"burr\": { \"kind\": \"tungsten\", \"diameter_mm\": 4 },\n" + axis + points + "}"), "2",
+         "burr: \"kind\": 'tungsten' is not one of cutting, diamond");
+  expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 4,\n\"shape\": \"cube\" },\n" + axis + points + "}"), "3",
+         "'cube' is not one of ball");
   expect(message(head + "\"burr\": { \"kind\": \"cutting\", \"diameter_mm\": 2.5 },\n" + axis + points + "}"), "2", "no burr of 2.5 mm");
   expect(message("{ \"osteotome_strokes\": 2,\n" + burr + axis + points + "}"), "1", "\"osteotome_strokes\" is 2");
   expect(message(head + burr + axis + points + ",\n}"), "6", "not valid JSON");
-  expect(message(head + burr + axis + points + ", \"camera\": { \"centre_mm\": [0, 0, 0], \"radius_mm\": -2, \"eye\": [1, 0, 0] } }"), "5", "camera: \"radius_mm\" is -2");
+  expect(message(head + burr + axis + points + ", \"camera\": { \"centre_mm\": [0, 0, 0], \"radius_mm\": -2, \"eye\": [1, 0, 0] } }"), "5",
+         "camera: \"radius_mm\" is -2");
   // Waypoints.
-  expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 8],\n\"drill_on\": false }"), "6", "waypoint 1: the key \"drill_on\" is not known: did you mean \"drill\"?");
+  expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 8],\n\"drill_on\": false }"), "6",
+         "waypoint 1: the key \"drill_on\" is not known: did you mean \"drill\"?");
   expect(with_points("{ \"t_s\": 0, \"at_mm\": [0, 0, 8], \"dril\": false }"), "5", "did you mean \"drill\"?");
   expect(with_points("{ \"t_s\": 1e12, \"at_mm\": [0, 0, 8] }"), "5", "\"t_s\" is 1e+12 but must be between 0 s and 21600 s");
   expect(with_points("{ \"t_s\": -1, \"at_mm\": [0, 0, 8] }"), "5", "\"t_s\" is -1");
@@ -316,14 +321,19 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 1e9 } }"), "5", "\"over_s\" is 1e+09");
   expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4, \"turns\": 2 } }"), "5", "did you mean \"turns_per_s\"?");
   expect(with_points(cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 }, \"at_mm\": [0, 0, 0] }"), "5", "\"at_mm\" is not known");
-  expect(with_points("{ \"t_s\": 2, \"at_mm\": [0, 0, 0] },\n" + cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"), "6", "times must rise");
-  expect(with_points("{ \"t_s\": 1, \"cavity\": { \"centre_mm\": [0, 0, 0], \"towards\": [0, 0, 0], \"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"), "5", "\"towards\" is a direction");
+  expect(with_points("{ \"t_s\": 2, \"at_mm\": [0, 0, 0] },\n" + cavity + "\"radius_mm\": 3, \"depth_mm\": 2, \"over_s\": 4 } }"), "6",
+         "times must rise");
+  expect(with_points("{ \"t_s\": 1, \"cavity\": { \"centre_mm\": [0, 0, 0], \"towards\": [0, 0, 0], \"radius_mm\": 3, \"depth_mm\": 2, "
+                     "\"over_s\": 4 } }"),
+         "5", "\"towards\" is a direction");
   // Actions.
-  expect(with_action("{ \"t_s\": 0.1, \"split\": {} },\n{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [1, 0, 0],\n\"kerf\": 3 } }"), "9",
-         "action 2, saw: the key \"kerf\" is not known: did you mean \"kerf_mm\"?");
+  expect(with_action(
+             "{ \"t_s\": 0.1, \"split\": {} },\n{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [1, 0, 0],\n\"kerf\": 3 } }"),
+         "9", "action 2, saw: the key \"kerf\" is not known: did you mean \"kerf_mm\"?");
   const std::string saw = "{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [1, 0, 0], ";
   EXPECT_EQ(with_action(saw + "\"kerf_mm\": 1, \"length_mm\": 0, \"depth_mm\": 5, \"piece\": 2 } }"), "read");
-  for (const std::string bad : {"\"kerf_mm\": 100", "\"kerf_mm\": 0", "\"length_mm\": -5", "\"depth_mm\": -1", "\"piece\": -2", "\"piece\": 1.5"})
+  for (const std::string bad :
+       {"\"kerf_mm\": 100", "\"kerf_mm\": 0", "\"length_mm\": -5", "\"depth_mm\": -1", "\"piece\": -2", "\"piece\": 1.5"})
     expect(with_action(saw + bad + " } }"), "7", "action 1, saw: \"" + bad.substr(1, bad.find('"', 1) - 1) + "\"");
   expect(with_action(saw + "\"along\": [2, 0, 0] } }"), "7", "\"along\" lies along \"normal\"");
   expect(with_action("{ \"t_s\": 0.2, \"saw\": { \"at_mm\": [0, 0, 0], \"normal\": [0, 0, 0] } }"), "7", "\"normal\" is a direction");
@@ -338,8 +348,10 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
   expect(with_action("{ \"t_s\": 0.2, \"move\": { \"piece\": 0, \"axis\": [0, 0, 0] } }"), "7", "\"axis\" is a direction");
   expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"tin\", \"at_mm\": [0, 0, 0], \"pieces\": [0] } }"), "7", "tin");
   for (const std::string pieces : {"[]", "[0, 1, 2]", "[1, 1]"})
-    expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"miniplate-4\", \"at_mm\": [0, 0, 0], \"pieces\": " + pieces + " } }"), "7", "\"pieces\" are one, or two");
-  expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"at_mm\": [0, 0, 0], \"radius_mm\": 150 } }"), "7", "\"radius_mm\" is 150 but must be");
+    expect(with_action("{ \"t_s\": 0.2, \"attach\": { \"plate\": \"miniplate-4\", \"at_mm\": [0, 0, 0], \"pieces\": " + pieces + " } }"),
+           "7", "\"pieces\" are one, or two");
+  expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"at_mm\": [0, 0, 0], \"radius_mm\": 150 } }"), "7",
+         "\"radius_mm\" is 150 but must be");
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"radius_mm\": 5 } }"), "7", "\"at_mm\" is missing");
   EXPECT_EQ(with_action("{ \"t_s\": 0.2, \"suction\": { \"mm3_per_s\": 0 } }"), "read");
   expect(with_action("{ \"t_s\": 0.2, \"irrigate\": { \"share_per_s\": 0.5 } }"), "7", "\"at_mm\" is missing");
@@ -378,7 +390,8 @@ TEST(Script, SchemaAndReaderAgree) {
     }
     return true;
   };
-  const nlohmann::json whole = nlohmann::json::parse(R"({"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1],
+  const nlohmann::json whole =
+      nlohmann::json::parse(R"({"osteotome_strokes": 1, "burr": {"kind": "cutting", "diameter_mm": 4}, "axis": [0, 0, 1],
       "waypoints": [{"t_s": 1, "at_mm": [0, 0, 0]}]})");
   ASSERT_TRUE(taken(whole));
   for (const auto& key : schema["required"]) {
@@ -448,7 +461,9 @@ TEST(HapticSettings, ErrorsSayFileAndLine) {
     }
     return "read";
   };
-  EXPECT_EQ(message("{ \"osteotome_haptics\": 1, // as printed\n\"stiffness_n_per_mm\": 2, \"hardness\": false, \"tools\": { \"diamond\": \"proxy\" } }"), "read");
+  EXPECT_EQ(message("{ \"osteotome_haptics\": 1, // as printed\n\"stiffness_n_per_mm\": 2, \"hardness\": false, \"tools\": { \"diamond\": "
+                    "\"proxy\" } }"),
+            "read");
   for (const auto& [members, says] : {std::pair{"\"stifness_n_per_mm\": 2", "did you mean \"stiffness_n_per_mm\"?"},
                                       {"\"stiffness_n_per_mm\": \"2\"", "must be a number"},
                                       {"\"hardness\": 1", "must be true, false or"},

@@ -35,7 +35,7 @@ struct Recipe {
   std::map<std::string, std::string> params;
   std::map<std::string, std::string> texts;  // port -> a document, or the content of a file that it reads
   std::vector<std::string> also;             // optional inputs that are connected too
-  std::vector<std::string> timed = {};     // outputs that hold durations: only that they are there
+  std::vector<std::string> timed = {};       // outputs that hold durations: only that they are there
 };
 
 constexpr const char* kProblem = R"({"osteotome_tissue": 1, "material": {"young_kpa": 10, "poisson": 0.4},
@@ -93,7 +93,8 @@ struct Values {
     surface = std::make_shared<const TriMesh>(mesh_from_vtk(sphere->GetOutput()));
     const auto stage = osteo_stages().make("tetrahedralize");
     for (const auto& f : stage->fields()) {
-      if (const auto it = table().at("tetrahedralize").params.find(std::string(f.doc.name)); it != table().at("tetrahedralize").params.end())
+      if (const auto it = table().at("tetrahedralize").params.find(std::string(f.doc.name));
+          it != table().at("tetrahedralize").params.end())
         f.from_text(it->second);
     }
     tets = std::get<Tets>(stage->run(std::vector<Data>{surface}, {})[0]);
@@ -263,7 +264,8 @@ TEST(CropFilter, FollowsItsParametersAndItsInputs) {
   ASSERT_TRUE(phantom->SetStage(registry, "phantom"));
   ASSERT_TRUE(phantom->SetParameter("region", "temporal") && phantom->SetParameter("spacing_mm", "4"));
   ASSERT_TRUE(crop->SetStage(registry, "crop"));
-  ASSERT_TRUE(crop->SetParameter("region", "box") && crop->SetParameter("centre_mm", "60,20,-20") && crop->SetParameter("size_mm", "30,30,30"));
+  ASSERT_TRUE(crop->SetParameter("region", "box") && crop->SetParameter("centre_mm", "60,20,-20") &&
+              crop->SetParameter("size_mm", "30,30,30"));
   crop->SetInputConnection(crop->GetInputPortIndex("image"), phantom->GetOutputPort(0));
   ASSERT_TRUE(mask->SetStage(registry, "threshold"));
   ASSERT_TRUE(mask->SetParameter("lower", "300"));

@@ -30,8 +30,8 @@ struct JsonMember {
   JsonValue value;
 };
 
-/// A file of settings or of things to do, read strictly: a key that is not known, one that is there twice, a value of another kind or out of
-/// range is an error with file and line.
+/// A file of settings or of things to do, read strictly: a key that is not known, one that is there twice, a value of another kind or out
+/// of range is an error with file and line.
 class JsonFile {
  public:
   /// `name` as errors call it. Comments as in C++ are taken. Error(usage) with the line.
@@ -44,7 +44,8 @@ class JsonFile {
   void allow(const JsonValue& object, const std::string& where, std::span<const std::string> known) const;
   /// Gives each field that the object names its value; the others stay as they are, unless they are needed. Keys of `besides` are the
   /// caller's. Error(usage).
-  void read(const JsonValue& object, const std::string& where, std::span<const FieldRef> fields, std::span<const std::string> besides = {}) const;
+  void read(const JsonValue& object, const std::string& where, std::span<const FieldRef> fields,
+            std::span<const std::string> besides = {}) const;
   /// The same for one field.
   void read(const JsonValue& value, const std::string& where, const FieldRef& field) const;
 

@@ -42,7 +42,7 @@ struct FieldRef {
   [[nodiscard]] std::string to_text() const;    ///< round-trips through from_text
   /// Throws Error(usage) that names the field (as its flag, unless it is `called` otherwise), the range and the choices.
   void from_text(std::string_view text, std::string_view called = {}) const;
-  [[nodiscard]] std::string flag() const;       ///< "--half-width"
+  [[nodiscard]] std::string flag() const;  ///< "--half-width"
 };
 
 namespace detail {

@@ -22,8 +22,8 @@ struct DustParams {
 /// fall by a cell, slide to lower neighbours (so it piles at 45 degrees), and spread where a cell is too full. Amounts are whole numbers of
 /// a 65,536th of a voxel, so nothing is lost or made: what was added is what lies there, was sucked off, washed away or fell out of reach.
 /// Bricks in which nothing moves sleep and cost nothing. The same calls give the same dust. Reads the bone while the servo writes it. Cost:
-/// about 15 ns a cell of bricks that are awake; push, suck and irrigate a few ns a cell of the bricks of dust they meet, however large their
-/// radius. Memory: 2 KB a brick that holds dust.
+/// about 15 ns a cell of bricks that are awake; push, suck and irrigate a few ns a cell of the bricks of dust they meet, however large
+/// their radius. Memory: 2 KB a brick that holds dust.
 class Dust {
  public:
   /// The bone must outlive this.

@@ -27,8 +27,8 @@ struct HardnessLaw {
   }
   [[nodiscard]] double at(double hu) const;
 };
-/// { "osteotome_hardness": 1, "source": "...", and any field of HardnessLaw; what is not named is as built in }. Error(usage), with line and
-/// key; `name` of the text.
+/// { "osteotome_hardness": 1, "source": "...", and any field of HardnessLaw; what is not named is as built in }. Error(usage), with line
+/// and key; `name` of the text.
 [[nodiscard]] HardnessLaw parse_hardness(std::string_view json, const std::string& name);
 /// libs/bone/hardness.json.
 [[nodiscard]] std::string_view default_hardness_json();

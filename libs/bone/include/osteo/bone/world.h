@@ -37,7 +37,7 @@ enum class ActionKind : std::uint32_t {
 /// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
-  static constexpr double kMostReachMm = 50;   ///< of a sucker and of water
+  static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
   static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
 
   std::uint64_t tick = 0;
@@ -139,8 +139,9 @@ class World {
     std::vector<std::uint32_t> gone;
     std::vector<std::pair<VoxelKey, float>> dust;  ///< names of voxels and the density that became dust there
   };
-  /// Cost: moves nothing; plates under a millisecond; saw and split a copy of each bone they change. `components` of a body (by id), up to date; where it is
-  /// empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing changed.
+  /// Cost: moves nothing; plates under a millisecond; saw and split a copy of each bone they change. `components` of a body (by id), up to
+  /// date; where it is empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing
+  /// changed.
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
 

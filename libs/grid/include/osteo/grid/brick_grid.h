@@ -77,7 +77,9 @@ class BrickGrid {
     return at(round(x.x), round(x.y), round(x.z));
   }
   /// The 512 values of a brick, x fastest, for the thread that writes (or when nobody does): plain loads, so vectors.
-  [[nodiscard]] const float* values_of_brick(std::uint32_t brick) const { return values_.get() + static_cast<std::size_t>(brick) * kVoxels; }
+  [[nodiscard]] const float* values_of_brick(std::uint32_t brick) const {
+    return values_.get() + static_cast<std::size_t>(brick) * kVoxels;
+  }
   void set(VoxelKey key, float v) { std::atomic_ref<float>(values_[key]).store(v, std::memory_order_relaxed); }
 
   /// Copies the block of voxels [lo, lo + n) into `out`, x fastest; voxels that are not stored are 0.
@@ -105,8 +107,8 @@ class BrickGrid {
   constexpr std::uint64_t most = BrickGrid::kMostCells;
   return n[0] > most || n[1] > most || n[2] > most || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
 }
-/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt) where the grid is beyond
-/// the limits of a BrickGrid.
+/// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt) where the grid is
+/// beyond the limits of a BrickGrid.
 [[nodiscard]] BrickGrid to_bricks(const SparseGrid& grid, bool all = false);
 /// Bricks with only zeros are left out; equal values come back bit for bit.
 [[nodiscard]] SparseGrid to_sparse(const BrickGrid& bricks, const std::string& name);

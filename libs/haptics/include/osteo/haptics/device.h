@@ -79,8 +79,8 @@ class SpringHand {
   Vec3 position_mm_, velocity_mm_s_;
 };
 
-/// A spring hand that can be led along a way: its goal goes ahead by no more than pulls gently, and waits where the hand cannot follow. Near
-/// bone 30 mm/s and 0.8 mm ahead (0.64 N), else 200 mm/s. Without headway for a second the way is given up, where the hand is.
+/// A spring hand that can be led along a way: its goal goes ahead by no more than pulls gently, and waits where the hand cannot follow.
+/// Near bone 30 mm/s and 0.8 mm ahead (0.64 N), else 200 mm/s. Without headway for a second the way is given up, where the hand is.
 class GuidedHand {
  public:
   /// From one other thread, which also asks led().
@@ -146,7 +146,9 @@ struct Script {
   struct Deed {
     double t_s = 0;
     SceneAction action;
-    [[nodiscard]] std::uint64_t tick(double rate_hz) const { return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * rate_hz)); }
+    [[nodiscard]] std::uint64_t tick(double rate_hz) const {
+      return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * rate_hz));
+    }
   };
   struct Camera {
     Vec3 centre_mm;

@@ -27,7 +27,8 @@ class Grains {
   /// The burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked at.
   void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every = false) noexcept;
   /// Takes what the burr covers of a voxel where it is placed, and tells how much bone is left that it never covered: density cannot fall
-  /// below. Unless `every` voxel is looked at, rows of them take turns while the burr moves little. Cost: 5 ns where it covers the voxel whole, else 0.02 (64 grains) to 0.4 us, twice that for tapers.
+  /// below. Unless `every` voxel is looked at, rows of them take turns while the burr moves little. Cost: 5 ns where it covers the voxel
+  /// whole, else 0.02 (64 grains) to 0.4 us, twice that for tapers.
   [[nodiscard]] float reach(const BrickGrid& bone, VoxelKey voxel) noexcept;
 
   /// How many voxels can be covered in part at a time; the next ones stay as they are until the burr covers them whole.
@@ -56,7 +57,7 @@ class Grains {
   std::vector<std::uint64_t> covered_;  // whole voxels, a bit each
   std::vector<Slot> slots_;             // open addressing, at most half full
   std::vector<std::uint64_t> grains_;   // words_ to each slot, a bit for each that is left
-  std::uint32_t parts_ = 1;  // along each edge of a voxel; 64 grains, a word, in each
+  std::uint32_t parts_ = 1;             // along each edge of a voxel; 64 grains, a word, in each
   std::size_t words_ = 1, used_ = 0;
   bool overflowed_ = false;
   // The burr in voxels, as the kernel has it; its axis starts at start_.

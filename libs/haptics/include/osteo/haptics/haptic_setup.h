@@ -52,8 +52,8 @@ struct HapticSetup {
   std::map<int, ContactMethod> tool_methods;  ///< index in burr_library() -> another method than params.contact.method for that tool
   std::optional<bool> hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
   std::string hardness_json;     ///< the law, as parse_hardness reads it; empty: the built-in one
-  std::string structures;                     ///< hash of the structures at risk that are watched; empty: none
-  std::vector<Vec3> curve;                    ///< points of a virtual fixture in mm; fewer than 2: none
+  std::string structures;        ///< hash of the structures at risk that are watched; empty: none
+  std::vector<Vec3> curve;       ///< points of a virtual fixture in mm; fewer than 2: none
   CurveConstraintParams curve_params;
   std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
 };

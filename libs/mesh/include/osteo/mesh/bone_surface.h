@@ -30,12 +30,12 @@ struct BoneSurface {
 /// where the sheet crosses the cell's edges.
 /// Follows S. Gibson, Constrained Elastic Surface Nets (1998), with the sheets of G. Nielson, Dual Marching Cubes (2004) and
 /// the treatment of shared ambiguous faces after R. Wenger, Isosurfaces (2013), section 5.
-/// Bone is value >= iso; bone voxels that meet only across an edge or corner are separate. No two points are equal, nor does a triangle lose its
-/// area, in single precision: what joins equal points, as readers of STL do, finds the same manifold.
+/// Bone is value >= iso; bone voxels that meet only across an edge or corner are separate. No two points are equal, nor does a triangle
+/// lose its area, in single precision: what joins equal points, as readers of STL do, finds the same manifold.
 [[nodiscard]] BoneSurface surface_nets(const BrickGrid& bone, float iso = 0.5F, const Context& context = {});
 
-/// A surface that encloses as much as the grid holds. The one at half density falls short of it, by what is cut off edges, is thinner than a
-/// voxel or is nowhere half full: 0.03 to 0.5 % of a large piece, most of a crumb of a few voxels.
+/// A surface that encloses as much as the grid holds. The one at half density falls short of it, by what is cut off edges, is thinner than
+/// a voxel or is nowhere half full: 0.03 to 0.5 % of a large piece, most of a crumb of a few voxels.
 struct VolumeSurface {
   TriMesh mesh;
   double bone_mm3 = 0;     ///< the grid's: density times volume
@@ -44,8 +44,9 @@ struct VolumeSurface {
   double scale = 1;        ///< its size was made this much larger, about its middle, where no density gives the volume
   double moved_mm = 0;     ///< outwards, on average, from where it would be at half density
 };
-/// Surface nets at the density between 0.05 and 0.95 that gives the volume to 0.1 %; where none does, scaled, unless a point would move by more
-/// than half a voxel. Closed and manifold, since it is a surface of the same bone and a scaled one. Cost: 1 to 15 times surface_nets, mostly 3.
+/// Surface nets at the density between 0.05 and 0.95 that gives the volume to 0.1 %; where none does, scaled, unless a point would move by
+/// more than half a voxel. Closed and manifold, since it is a surface of the same bone and a scaled one. Cost: 1 to 15 times surface_nets,
+/// mostly 3.
 [[nodiscard]] VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context = {});
 
 /// The thesis' surface: each vertex is a voxel on the surface (bone with an empty neighbour among 26); triangles join voxels

@@ -23,9 +23,9 @@ struct LoopStats {
   std::string realtime_refusal;  ///< empty, or why
 };
 
-/// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps (clock_nanosleep). When real-time priority is refused the loop runs
-/// all the same with the smallest timer slack, and says so. A late tick does not shift the later ones; periods that passed
-/// meanwhile are skipped and counted.
+/// SCHED_FIFO priority 80, memory locked, stack touched beforehand, processor kept from deep sleep, absolute sleeps (clock_nanosleep). When
+/// real-time priority is refused the loop runs all the same with the smallest timer slack, and says so. A late tick does not shift the
+/// later ones; periods that passed meanwhile are skipped and counted.
 class FixedRateLoop {
  public:
   /// `tick` returns false to end the loop. It must not allocate or lock. What it throws ends the loop; see failure().

@@ -45,7 +45,8 @@ class CaseUpdate {
 };
 
 /// Names of what lies in the folder and is no part of a case; of a case, what `outputs` would replace without having made it.
-[[nodiscard]] std::vector<std::string> foreign_files(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& outputs);
+[[nodiscard]] std::vector<std::string> foreign_files(const std::filesystem::path& folder,
+                                                     const std::vector<std::filesystem::path>& outputs);
 
 /// The text of manifest.json: units, frame, what made each file, hashes, recipe; nothing that identifies the patient.
 [[nodiscard]] std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_name, const std::vector<NodeResult>& results,
@@ -60,7 +61,8 @@ struct ManifestFile {
 /// Role -> file. Error(corrupt) for what is no manifest, names no bone, or names a file outside the case.
 [[nodiscard]] std::map<std::string, ManifestFile> parse_manifest(std::string_view json);
 
-/// Finishes an interrupted commit, reads the manifest, checks that the files are there and unchanged, loads the bone. Errors: no_input, corrupt.
+/// Finishes an interrupted commit, reads the manifest, checks that the files are there and unchanged, loads the bone. Errors: no_input,
+/// corrupt.
 [[nodiscard]] Case load_case(const std::filesystem::path& folder);
 
 }  // namespace osteo

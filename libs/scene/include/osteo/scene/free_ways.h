@@ -50,7 +50,8 @@ class FreeWays {
     HandPose end;
   };
   /// To bone that is seen along `forward` (unit) at `seen_mm`: the nearest place before it on that line of sight where the tool is free by
-  /// half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so, leaning to another side or towards who looks.
+  /// half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so, leaning to another side or towards who
+  /// looks.
   [[nodiscard]] Approach approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
 
   /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it does.

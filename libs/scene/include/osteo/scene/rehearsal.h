@@ -46,8 +46,9 @@ struct RehearsalSummary {
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
-  std::uint64_t ticks_not_followed = 0;  ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
-  bool interrupted = false;              ///< run_to_end() was asked to stop
+  std::uint64_t ticks_not_followed =
+      0;                     ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
+  bool interrupted = false;  ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
@@ -55,10 +56,10 @@ struct RehearsalSummary {
   std::vector<LiveComponents::Component> pieces;  ///< of at least Follower::kLeastPieceMm3, largest first; empty unless they were followed
   std::size_t bodies = 1;                         ///< that move on their own
   std::vector<Fixture> fixtures;
-  std::optional<LoopStats> loop;  ///< only when it ran by the clock
+  std::optional<LoopStats> loop;      ///< only when it ran by the clock
   std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
   std::vector<ActionNote> notes;
-  std::uint64_t unusable_poses = 0;   ///< ticks in which the device gave none that could be used
+  std::uint64_t unusable_poses = 0;  ///< ticks in which the device gave none that could be used
   [[nodiscard]] bool refused() const {
     return std::any_of(notes.begin(), notes.end(), [](const ActionNote& n) { return !n.done; });
   }
@@ -74,12 +75,13 @@ class Rehearsal {
   /// By the clock, in threads of its own.
   void start();
   [[nodiscard]] bool running() const;
-  /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may wait for the disk), and
-  /// then throws what a thread threw, if one did. Error(cannot_write) when it could not be recorded to the end. Again: the same summary.
+  /// Ends the threads, takes the rest of the stream, does what was due and waits, closes the session file (which may wait for the disk),
+  /// and then throws what a thread threw, if one did. Error(cannot_write) when it could not be recorded to the end. Again: the same
+  /// summary.
   RehearsalSummary stop();
 
-  /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be recorded any more. Same
-  /// bone, surface and session as by the clock. Errors as stop().
+  /// As fast as possible in this thread, up to the device's end, or until the context is cancelled or nothing can be recorded any more.
+  /// Same bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
   /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
@@ -89,7 +91,8 @@ class Rehearsal {
 
   /// From any thread, while it runs: how the recording does (nothing lost, where none was asked for).
   [[nodiscard]] Recorder::Status recording() const { return recorder_ ? recorder_->status() : Recorder::Status{}; }
-  /// For people, in a line: recording that has ended, that lost ticks or lags by more than 3 s, a device's thread in trouble. Empty: all well.
+  /// For people, in a line: recording that has ended, that lost ticks or lags by more than 3 s, a device's thread in trouble. Empty: all
+  /// well.
   [[nodiscard]] std::string trouble() const;
 
   /// Latest tick, for display.
@@ -148,16 +151,16 @@ class Rehearsal {
 /// What a replay found.
 struct ReplayResult {
   std::uint64_t ticks = 0, actions = 0;
-  /// That were run again. Behind the first gap nothing can be: the servo's own state there is not known. Bone, surface and dust at the end are
-  /// then compared as the recorded changes give them.
+  /// That were run again. Behind the first gap nothing can be: the servo's own state there is not known. Bone, surface and dust at the end
+  /// are then compared as the recorded changes give them.
   std::uint64_t ticks_repeated = 0;
   std::vector<std::string> losses;  ///< what the session lacks; see losses()
-  bool complete = false;   ///< the session was closed properly
+  bool complete = false;            ///< the session was closed properly
   bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
   std::string difference;  ///< the first one
   std::string bone_hash, surface_hash, dust_hash;
   std::map<std::uint32_t, StructureEvents> structures;  ///< as the session's summary has them
-  std::shared_ptr<const World> world;  ///< as the session left it
+  std::shared_ptr<const World> world;                   ///< as the session left it
   double removed_mm3 = 0;
   double seconds = 0;
 };
@@ -165,7 +168,8 @@ struct ReplayResult {
 /// Runs the recorded poses and actions through the same servo. `start` and `anatomy` as the session had them: Error(corrupt), Error(usage)
 /// when they are not.
 [[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context);
-/// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given. Error(corrupt).
+/// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given.
+/// Error(corrupt).
 void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
 
 /// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look like metres, a sucker

@@ -29,8 +29,8 @@ struct SessionFolder {
 [[nodiscard]] World world_of(const Case& the_case, const Anatomy& anatomy);
 /// The scene at the beginning of a session: the case's, as the sessions it goes on from have left it (their recorded changes and actions).
 [[nodiscard]] World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context);
-/// The scene at the end of a session; where bone was lost on the way, the scene before that. Warns of all that the session lacks. Error(corrupt)
-/// when it is damaged.
+/// The scene at the end of a session; where bone was lost on the way, the scene before that. Warns of all that the session lacks.
+/// Error(corrupt) when it is damaged.
 [[nodiscard]] World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context);
 
 /// Settings from `file`, or where that is empty from haptics.json of the case where there is one.

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "osteo/base/error.h"
-#include "osteo/dicom/verdict.h"
 #include "osteo/data/sparse_grid.h"
+#include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
 
 namespace osteo {
@@ -16,9 +16,9 @@ struct WindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
   std::string title;
   int tool = 3;
-  bool from_case = true;          ///< how the first session begins
-  std::string device = "mouse";  ///< as the panel names it
-  VerdictSummary scan;  ///< what the import found in the scan; status empty: unknown
+  bool from_case = true;             ///< how the first session begins
+  std::string device = "mouse";      ///< as the panel names it
+  VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
