@@ -60,7 +60,7 @@ class Worker:
     """A copy of the sources with a build of its own."""
 
     def __init__(self, folder):
-        self.folder, self.build = folder, folder / "build"
+        self.folder, self.build = folder, folder / "build/release"
         folder.mkdir(parents=True, exist_ok=True)
         files = subprocess.run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard"], capture_output=True, text=True, check=True).stdout.split("\n")
         for name in filter(None, files):
@@ -68,8 +68,8 @@ class Worker:
             if source.is_file() and not (target.exists() and target.read_bytes() == source.read_bytes()):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target)
-        options = ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1", "-DOSTEO_CGAL=OFF", "-DOSTEO_TETGEN=OFF",
-                   "-DOSTEO_CERES=OFF", "-DOSTEO_WINDOW=OFF", f"-DOSTEO_SHARED_DATA={ROOT.parent / 'shared/data'}"]
+        # As the release preset, so that a compiler cache has most of it already.
+        options = ["-DCMAKE_BUILD_TYPE=Release", f"-DOSTEO_SHARED_DATA={ROOT}/../shared/data"]
         subprocess.run(["cmake", "-S", folder, "-B", self.build, "-G", "Ninja", *options], check=True, stdout=subprocess.DEVNULL)
 
     def make(self, targets):
