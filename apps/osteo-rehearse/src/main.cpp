@@ -8,6 +8,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/bone/burr.h"
+#include "osteo/bone/plates.h"
 #include "osteo/cli/command.h"
 #include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
@@ -52,7 +53,7 @@ class Hands {
     return std::make_unique<MouseDevice>(start);
   }
   [[nodiscard]] std::string name() const {
-    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) + (pedal_ ? " and pedal" : "");
+    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) + (pedal_ && hand_ != Hand::mouse ? " and pedal" : "");
   }
 
  private:
@@ -70,6 +71,11 @@ Vec3 near_the_bone(const World& world, const HandGoal& start) {
     return start.position_mm;
   }
 }
+
+class Sitting;
+// When the display goes away Xlib ends the program, by exit(): the session is closed first.
+Sitting* g_sitting = nullptr;
+void close_at_exit();
 
 // One session after another on a case. Between them, and after whatever throws, none runs.
 class Sitting {
@@ -94,16 +100,21 @@ class Sitting {
     options_.haptics.device = device->traits();
     options_.soft = soft_body_of(case_.folder);
     // Last, so that what fails before leaves no folder.
+    const SessionFolder before = session_;
     session_ = create_session_folder(next_folder_, session.case_folder, session.resumed_from);
     next_folder_.clear();
     options_.session_file = session_.stream();
     try {
       rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(device), options_, io_.context);
       rehearsal_->start();
+      // Registered again: what the servo has made for itself by now must outlive it.
+      static_cast<void>(plate_library());
+      std::atexit(close_at_exit);
     } catch (...) {
       rehearsal_.reset();
       std::error_code ignored;  // nothing was recorded in it
       std::filesystem::remove_all(session_.folder, ignored);
+      session_ = before;  // what is kept
       throw;
     }
     return start;
@@ -135,9 +146,6 @@ class Sitting {
   std::unique_ptr<Rehearsal> rehearsal_;
   bool told_ = false;
 };
-
-// When the display goes away Xlib ends the program, by exit(): the session is closed first.
-Sitting* g_sitting = nullptr;
 
 void close_at_exit() {
   if (g_sitting == nullptr) return;
@@ -189,7 +197,6 @@ struct WindowCommand {
     actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
     actions.stop = [&] { return io.context.cancelled(); };
     g_sitting = &sitting;
-    std::atexit(close_at_exit);
     int gl_errors = 0;
     try {
       gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions);

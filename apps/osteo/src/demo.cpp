@@ -59,16 +59,20 @@ int DemoCommand::run(const Params& p, cli::Invocation& io) {
   io.settings.clear();
   io.arguments = {source.string()};
   // Only what an earlier demo left on another scan is made anew.
-  const auto earlier = read_recipe(prepare.out);
+  std::optional<Recipe> earlier;
+  try {
+    earlier = read_recipe(prepare.out);
+  } catch (const Error&) {  // a damaged case is made anew, as --fresh says
+  }
   const bool force = io.common.force;
   io.common.force = force || (earlier && earlier->source_hash != hash_path(source));
   PrepareCommand::run(prepare, io);
   io.common.force = force;
 
   say("drilling for " + format_number(p.seconds) + " s");
-  const fs::path session = out / "session";
-  // Only what an earlier demo left is replaced; another folder of this name is refused below, as by rehearse.
-  if (fs::exists(session / "session.json")) fs::remove_all(session);
+  // A session is never replaced, an earlier demo's neither.
+  fs::path session = out / "session";
+  for (int n = 2; fs::exists(session); ++n) session = out / ("session-" + std::to_string(n));
   RehearseCommand::Params rehearse;
   rehearse.headless = true;
   rehearse.out = session.string();

@@ -74,7 +74,8 @@ cli::CommandInfo PrepareCommand::info() {
         "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti); may be left out when the case was made on this "
         "machine",
         true}},
-      "osteo prepare DICOM_FOLDER -o CASE"};
+      "osteo prepare DICOM_FOLDER -o CASE",
+      true};
 }
 
 int PrepareCommand::run(const Params& p, cli::Invocation& io) {

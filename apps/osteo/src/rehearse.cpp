@@ -141,7 +141,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   } else {
     rehearsal.start();
     // A script whose strokes nobody records is worth nothing: a full disk ends it at once.
-    bool lags = false;
+    bool told_behind = false, told_lost = false;
     while (rehearsal.running() && !rehearsal.recording().failure) {
       const double t = static_cast<double>(rehearsal.latest().tick) / p.rate_hz;
       try {
@@ -149,7 +149,9 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
       } catch (const Error&) {
         break;
       }
-      if (const std::string trouble = rehearsal.trouble(); !trouble.empty() && !std::exchange(lags, true)) io.context.warn(trouble);
+      const std::string trouble = rehearsal.trouble();
+      if (!trouble.empty() && !std::exchange(rehearsal.recording().ticks_lost > 0 ? told_lost : told_behind, true))
+        io.context.warn(trouble);
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     const bool interrupted = rehearsal.running() && io.context.cancelled();
@@ -158,17 +160,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   }
   for (const std::string& w : s.warnings) io.context.warn(w);
   s.warnings.insert(s.warnings.begin(), doubts.begin(), doubts.end());
-  if (s.interrupted) {  // closed all the same; what takes time is left out
-    write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
-    io.end_progress();
-    if (!io.common.quiet) io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
-    io.context.check_cancelled();
-  }
-  TriMesh after;
-  draw("after.png");
-  rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
-  save_surface(after, folder / "surface.ply");
-
+  // Before what takes time and may be interrupted or find the disk full.
   const std::string summary =
       write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
   io.end_progress();
@@ -181,12 +173,21 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (s.unusable_poses > 0)
     io.err << "the pose could not be used for " << format_number(static_cast<double>(s.unusable_poses) / p.rate_hz)
            << " s: not finite, or beyond all reach\n";
+  if (!s.gaps.empty())
+    io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
+           << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
+  if (s.interrupted) {  // closed all the same; what takes time is left out
+    if (!io.common.quiet) io.err << "stopped after " << s.ticks << " ticks; session: " << folder.string() << "  (summary.json)\n";
+    io.context.check_cancelled();
+  }
+  TriMesh after;
+  draw("after.png");
+  rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
+  save_surface(after, folder / "surface.ply");
+  io.end_progress();
   if (!io.common.quiet) {
     io.err << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
-    if (s.ticks_not_recorded > 0)
-      io.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
-             << " gaps, since the disk did not keep up; what bone became is recorded, and a replay repeats what comes before the first\n";
     if (s.ticks_not_followed > 0)
       io.err << "surface, pieces and dust missed " << s.ticks_not_followed
              << " ticks, since the machine did not keep up; they caught up from the bone itself\n";
@@ -201,7 +202,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
            << folder.string() << '\n';
   }
   if (io.common.json) io.out << summary;
-  return static_cast<int>(s.refused() ? ExitCode::partial : ExitCode::ok);
+  return static_cast<int>(s.refused() || !s.gaps.empty() ? ExitCode::partial : ExitCode::ok);
 }
 
 cli::CommandInfo ReplayCommand::info() {
@@ -307,7 +308,6 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
   const Case the_case = load_case(session.case_folder);
   const World world = world_at_end(session, the_case, {}, io.context);
   const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
-  const std::string text = write_plan(world, folder, io.context);
   Follower follower(world, {true, false, false}, 1000, io.context);
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
   for (const auto& q : surface_of(world, io.context).points_mm) {
@@ -317,7 +317,12 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
     }
   }
   const WorldPicture view{(lo + hi) * 0.5, 0.36 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
-  save_picture(draw_world(world, follower, nullptr, view), folder / "plan.png");
+  const auto picture = draw_world(world, follower, nullptr, view);
+  std::string text;
+  write_folder_atomically(folder, {}, [&](const fs::path& whole) {
+    text = write_plan(world, whole, io.context);
+    save_picture(picture, whole / "plan.png");
+  });
   io.end_progress();
   if (io.common.json) io.out << text;
   if (!io.common.quiet)

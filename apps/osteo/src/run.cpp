@@ -17,7 +17,8 @@ cli::CommandInfo RunCommand::info() {
           "Variables of the file are set with --set NAME=VALUE, a parameter of one stage with --set ID.PARAMETER=VALUE. The whole graph is "
           "checked before anything is read.",
           {{"pipeline", "a .json file"}},
-          "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE"};
+          "osteo run pipelines/temporal-bone.json --set source=CT_FOLDER --set case=CASE",
+          true};
 }
 
 int RunCommand::run(const Params& p, cli::Invocation& io) {

@@ -256,7 +256,7 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   } else {
     auto fields = command->fields();
     for (const auto& f : fields_of<Common>(common)) fields.push_back(f);
-    Parsed parsed = parse(args, fields, {}, true);
+    Parsed parsed = parse(args, fields, {}, command->info().takes_settings);
     const auto& wanted = command->info().positionals;
     const auto required = static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](const auto& p) { return !p.optional; }));
     if (parsed.positionals.size() < required || parsed.positionals.size() > wanted.size()) {

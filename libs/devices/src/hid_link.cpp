@@ -23,9 +23,9 @@ void HidLink::run() {
   sched_param priority{};
   priority.sched_priority = 70;
   ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority);
-  while (!stop_) {
+  const auto guarded = [this](auto&& f) {
     try {
-      read_on();
+      f();
     } catch (const std::exception& e) {
       const std::lock_guard lock(trouble_mutex_);
       trouble_ = e.what();
@@ -33,7 +33,10 @@ void HidLink::run() {
       const std::lock_guard lock(trouble_mutex_);
       trouble_ = "unknown trouble with the device";
     }
-    if (connected_.exchange(false)) handler_.gone();
+  };
+  while (!stop_) {
+    guarded([&] { read_on(); });
+    if (connected_.exchange(false)) guarded([&] { handler_.gone(); });
     if (!stop_) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
 }
@@ -51,6 +54,10 @@ void HidLink::read_on() {
   if (port == nullptr) return;
   connected_ = true;
   handler_.opened(*port);
+  {
+    const std::lock_guard lock(trouble_mutex_);
+    trouble_.clear();  // it works again
+  }
   while (!stop_) {
     int n = port->read(buffer, timeout_ms_);
     if (n < 0) return;

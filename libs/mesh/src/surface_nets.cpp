@@ -489,7 +489,8 @@ VolumeSurface surface_of_volume(const BrickGrid& bone, const Context& context) {
       result.surface_mm3 = enclosed_volume_mm3(result.mesh);
     }
   }
-  result.moved_mm = (result.surface_mm3 - (half.off + wanted) * voxel_mm3) / area_mm2(result.mesh);
+  const double area = area_mm2(result.mesh);
+  result.moved_mm = area > 0 ? (result.surface_mm3 - (half.off + wanted) * voxel_mm3) / area : 0;
   return result;
 }
 

@@ -221,9 +221,9 @@ RehearsalSummary Rehearsal::finish() {
   if (loop_ && loop_->failure() && !failure_) failure_ = loop_->failure();
   RehearsalSummary s;
   std::string dust_hash;
+  operation_.finish();  // what was handed over belongs to the stream, whatever failed
   if (!failure_) {
     try {
-      operation_.finish();
       drain();
       // Due before the last tick or asked for, but the servo had ended first.
       const auto take_due = [&]() -> std::optional<SceneAction> {
@@ -254,7 +254,8 @@ RehearsalSummary Rehearsal::finish() {
   s.removed_mm3 = operation_.removed_mm3();
   s.sawn_mm3 = follower_->sawn_mm3();
   s.tissue_mm3 = tissue_mm3_;
-  s.bone_hash = operation_.world().hash();
+  // After a failure nobody knows whether all of it went into the stream.
+  if (!failure_) s.bone_hash = operation_.world().hash();
   s.ticks_not_followed = follower_->ticks_lost();
   s.voxel_mm3 = voxel_mm3_;
   s.bodies = operation_.world().bodies().size();

@@ -394,8 +394,11 @@ void export_session(const Session& s, const fs::path& path, const Context& conte
     });
   };
   if (ending == ".csv") {
-    streamed(path, [&](OutFile& out) { csv(s, out, context); });
-    streamed(export_files(path)[1], [&](OutFile& out) { actions_csv(s, out); });
+    // Both are whole before the first takes its name.
+    streamed(path, [&](OutFile& out) {
+      csv(s, out, context);
+      streamed(export_files(path)[1], [&](OutFile& actions) { actions_csv(s, actions); });
+    });
   } else if (ending == ".mcap") {
     streamed(path, [&](OutFile& out) { mcap(s, out, context); });
   } else if (ending == ".h5" || ending == ".hdf5") {

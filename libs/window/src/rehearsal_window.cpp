@@ -184,6 +184,12 @@ class RehearsalWindow {
                          axis_ = from_floats(goal_.axis);
                          new_bone();
                        });
+    // A session that nobody can see is closed, with the reason kept.
+    if (saved && !begun && actions_.rehearsal() != nullptr) {
+      const std::optional<Error> why = failure_;
+      guarded([&] { actions_.save(); });
+      failure_ = why;
+    }
     return begun;
   }
 
@@ -397,6 +403,10 @@ class RehearsalWindow {
   }
 
   void set_tool(int tool) {
+    if (leading_) {  // on a way that was found for the burr that it has
+      say("the drill is on its way: change the burr when it has arrived");
+      return;
+    }
     tool_ = tool;
     const Burr& burr = burr_library()[static_cast<std::size_t>(tool)];
     burr_mapper_->SetInputData(round_cone_surface(burr.head()));

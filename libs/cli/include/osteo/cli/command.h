@@ -55,6 +55,7 @@ struct CommandInfo {
   std::string name, synopsis, description;
   std::vector<Positional> positionals;
   std::string example;
+  bool takes_settings = false;  ///< --set NAME=VALUE
 };
 
 /// What a verb gets to work with.

@@ -71,6 +71,12 @@ class FootPedal final : HidHandler {
   HidLink link_;
 };
 
+/// Of the device, or of the pedal beside it (may be null).
+[[nodiscard]] inline std::string trouble_of(const HidLink& link, const FootPedal* pedal) {
+  std::string text = link.trouble();
+  return text.empty() && pedal != nullptr ? pedal->trouble() : text;
+}
+
 /// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 drills; with a pedal, that does (bit 0; bit 1
 /// changes nothing here).
 class SpaceMouseDevice final : public Device, HidHandler {
@@ -86,7 +92,7 @@ class SpaceMouseDevice final : public Device, HidHandler {
   Led led() noexcept override { return hand_.led(); }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
-  [[nodiscard]] std::string trouble() const override { return link_.trouble(); }
+  [[nodiscard]] std::string trouble() const override { return trouble_of(link_, pedal_); }
 
  private:
   void report(HidPort& port, std::span<const std::byte> report) override;
@@ -116,7 +122,7 @@ class WoodenHapticsDevice final : public Device, HidHandler {
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override;
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
-  [[nodiscard]] std::string trouble() const override { return link_.trouble(); }
+  [[nodiscard]] std::string trouble() const override { return trouble_of(link_, pedal_); }
   /// Reports too short to be one; they are passed over.
   [[nodiscard]] std::uint64_t garbled() const noexcept { return garbled_; }
 

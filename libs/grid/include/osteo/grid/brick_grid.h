@@ -103,9 +103,9 @@ class BrickGrid {
   return bricks > BrickGrid::kMostBricks;
 }
 [[nodiscard]] constexpr bool too_wide_for_bricks(std::array<std::uint64_t, 3> n) {
-  // Without overflow: no axis alone may be longer than the whole.
-  constexpr std::uint64_t most = BrickGrid::kMostCells;
-  return n[0] > most || n[1] > most || n[2] > most || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
+  // Along an axis 2^20 voxels less a brick: surfaces name a cell by 20 bits an axis. That also keeps the products from overflowing.
+  constexpr std::uint64_t most = BrickGrid::kMostCells, along = (std::uint64_t{1} << 17) - 1;
+  return n[0] > along || n[1] > along || n[2] > along || n[0] * n[1] > most || n[0] * n[1] * n[2] > most;
 }
 /// All leaves that hold a value > 0, or with `all` every leaf that stores anything. O(stored voxels). Error(corrupt) where the grid is
 /// beyond the limits of a BrickGrid.

@@ -26,7 +26,8 @@ struct ToolSkin {
 /// A plate as it is gripped.
 [[nodiscard]] ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip);
 
-/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. No soft tissue. One thread.
+/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Soft tissue and structures at risk are not
+/// looked at: a way may touch a nerve that has been laid bare (it counts as touched; the drill is off). One thread.
 class FreeWays {
  public:
   /// Keeps the bodies of the world, not the world. O(bricks).
