@@ -128,8 +128,10 @@ TEST(GridIo, VdbKeepsVoxelsAndObliqueFrame) {
     const Ijk c = bricks.coordinate(v);
     EXPECT_EQ(back.at(c.i, c.j, c.k), bricks.value(v));
   }
+#ifndef __SANITIZE_ADDRESS__  // OpenVDB may then ask for an absurd amount of memory, which ends the program there instead of throwing
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   EXPECT_THROW(static_cast<void>(load_grid(path)), Error);
+#endif
 }
 
 TEST(BrickGrid, FindCoordinateAndBlocksAgree) {

@@ -318,7 +318,8 @@ TEST(Recorder, AFullDiskIsToldAtOnceAndRemembered) {
         EXPECT_TRUE(recorder.status().failure);
       }
       const Session s = read_session(path);
-      EXPECT_GE(s.ticks.size(), 200u);
+      // Its thread may come to the first ticks together with later ones that find no room.
+      EXPECT_GE(s.ticks.size(), by_thread ? 1u : 200u);
       EXPECT_LT(s.ticks.size(), servo.next);
       EXPECT_FALSE(s.end) << "a session that failed is not closed";
       fs::remove(path);
