@@ -23,7 +23,7 @@ using VoxelKey = std::uint32_t;
 
 /// The set of bricks is fixed when the grid is made; values may change. A voxel outside every brick reads as 0.
 /// Limits: kMostBricks bricks, since names are 32 bits wide (17 GB of densities), in a box of at most kMostCells bricks (a table of 0.5 GB:
-/// 0.2 mm over 820 mm each way).
+/// 0.2 mm over 820 mm each way), 2^17 - 1 of them along an axis.
 /// One thread writes (`set`), others may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old
 /// or new values, never torn ones.
 /// Memory: 4 bytes a voxel of each brick, plus 4 bytes for each brick of the bounding box.
