@@ -4,6 +4,7 @@
 #include <ceres/ceres.h>
 #endif
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <chrono>
