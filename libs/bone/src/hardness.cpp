@@ -43,10 +43,7 @@ Hardness::Hardness(const BrickGrid& bone, const SparseGrid& hu, const HardnessLa
     const Ijk c = bone.coordinate(v);
     const auto value = static_cast<double>(sampler.nearest(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)})));
     if (value == hu.background) continue;
-    // Where bone fills a voxel in part its HU are mixed with what lies beside it, taken as 0 HU; the share is counted by the density
-    // already.
-    const double share = std::clamp(static_cast<double>(bone.value(v)), 0.25, 1.0);
-    steps_[v] = static_cast<std::uint8_t>(std::lround(64 * law_.at(value > 0 ? value / share : value)));
+    steps_[v] = static_cast<std::uint8_t>(std::lround(64 * law_.at(value)));
   }
 }
 
