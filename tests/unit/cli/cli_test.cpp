@@ -53,7 +53,7 @@ struct EchoCommand {
     visit({"on", "a flag"}, p.on);
     visit({"size", "a number", "mm", 0, 5}, p.size);
   }
-  static cli::CommandInfo info() { return {"echo", "says", "Says.", {{"what", "to say", true}}, "osteo echo"}; }
+  static cli::CommandInfo info() { return {"echo", "says", "Says.", {{"what", "to say", true}}, "osteo echo", true}; }
   static int run(const Params& p, cli::Invocation& io) {
     nlohmann::json j{{"text", p.text},         {"on", p.on}, {"size", p.size}, {"given", io.given}, {"arguments", io.arguments},
                      {"seed", io.context.seed}};
