@@ -1,8 +1,16 @@
 #include "osteo/base/parallel.h"
 
+#ifdef __SANITIZE_THREAD__
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+#else
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#endif
 
 #include <algorithm>
 
@@ -16,6 +24,26 @@ void parallel_for(std::size_t n, std::size_t grain, int threads, const std::func
     for (std::size_t c = 0; c < chunks; ++c) run(c);
     return;
   }
+#ifdef __SANITIZE_THREAD__
+  // oneTBB is not built for the thread sanitizer, which does not see that its tasks end before their caller goes on. Plain threads it sees.
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex mutex;
+  const auto work = [&] {
+    try {
+      for (std::size_t c; (c = next++) < chunks;) run(c);
+    } catch (...) {
+      next = chunks;
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  std::vector<std::thread> others(std::min<std::size_t>(threads > 0 ? static_cast<std::size_t>(threads) : 4, chunks) - 1);
+  for (auto& t : others) t = std::thread(work);
+  work();
+  for (auto& t : others) t.join();
+  if (failure) std::rethrow_exception(failure);
+#else
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
     tbb::parallel_for(
@@ -25,6 +53,7 @@ void parallel_for(std::size_t n, std::size_t grain, int threads, const std::func
         },
         tbb::simple_partitioner());
   });
+#endif
 }
 
 }  // namespace osteo
