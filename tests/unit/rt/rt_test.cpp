@@ -56,6 +56,12 @@ TEST(Seqlock, ReaderNeverSeesAHalfWrittenValue) {
     std::array<std::uint64_t, 9> x;
   };
   Seqlock<Value> lock;
+  Value seven;
+  seven.x.fill(7);
+  lock.store(seven);
+  Value read{};
+  ASSERT_TRUE(lock.try_load(read));  // nobody writes: it succeeds
+  EXPECT_EQ(read.x, seven.x);
   std::atomic<bool> stop{false};
   std::thread writer([&] {
     for (std::uint64_t n = 1; !stop; ++n) {
