@@ -90,8 +90,11 @@ class Sitting {
 
   HandGoal begin(bool from_case, const HandView& view) {
     rehearsal_.reset();
-    options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
-    if (!io_.common.quiet && !std::exchange(told_, true)) io_.err << told_hardness(options_.anatomy) << std::endl;
+    if (!has_anatomy_) {  // the same for all sessions
+      options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
+      has_anatomy_ = true;
+      if (!io_.common.quiet) io_.err << told_hardness(options_.anatomy) << std::endl;
+    }
     SessionFolder session{next_folder_, case_.folder, from_case ? std::filesystem::path() : last_};
     World world = world_at_begin(session, case_, options_.anatomy, io_.context);
     const HandPose pose = FreeWays(world, skin_of_burr(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
@@ -144,7 +147,7 @@ class Sitting {
   RehearsalOptions options_;
   SessionFolder session_;
   std::unique_ptr<Rehearsal> rehearsal_;
-  bool told_ = false;
+  bool has_anatomy_ = false;
 };
 
 void close_at_exit() {

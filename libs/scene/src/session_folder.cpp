@@ -142,12 +142,32 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
   return anatomy;
 }
 
-std::string hardness_json(const Anatomy& anatomy) {
-  if (!anatomy.hardness) return "null";
+namespace {
+
+ordered_json hardness_of(const Anatomy& anatomy) {
+  if (!anatomy.hardness) return nullptr;
   HardnessLaw law = anatomy.hardness->law();
   ordered_json j;
   for (const FieldRef& f : fields_of<HardnessLaw>(law)) j[std::string(f.doc.name)] = ordered_json::parse(f.to_text());
-  return j.dump();
+  return j;
+}
+
+ordered_json structures_of(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
+  ordered_json j = ordered_json::array();
+  for (const auto& [value, e] : structures) {
+    j.push_back({{"name", map.name_of(static_cast<std::uint8_t>(value))},
+                 {"value", value},
+                 {"least_clearance_mm", e.least_clearance_mm},
+                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
+                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
+  }
+  return j;
+}
+
+}  // namespace
+
+std::string hardness_json(const Anatomy& anatomy) {
+  return hardness_of(anatomy).dump();
 }
 
 std::string told_hardness(const Anatomy& anatomy) {
@@ -160,15 +180,7 @@ std::string told_hardness(const Anatomy& anatomy) {
 }
 
 std::string structures_json(const std::map<std::uint32_t, StructureEvents>& structures, const StructureMap& map, double rate_hz) {
-  ordered_json j = ordered_json::array();
-  for (const auto& [value, e] : structures) {
-    j.push_back({{"name", map.name_of(static_cast<std::uint8_t>(value))},
-                 {"value", value},
-                 {"least_clearance_mm", e.least_clearance_mm},
-                 {"touched_s", static_cast<double>(e.ticks_touched) / rate_hz},
-                 {"injured_s", static_cast<double>(e.ticks_injured) / rate_hz}});
-  }
-  return j.dump();
+  return structures_of(structures, map, rate_hz).dump();
 }
 
 std::string write_summary(const SessionFolder& session, const RehearsalSummary& s, double rate_hz, const std::string& burr,
@@ -179,7 +191,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["rate_hz"] = rate_hz;
   j["burr"] = burr;
   j["removed_mm3"] = s.removed_mm3;
-  j["hardness"] = ordered_json::parse(hardness_json(anatomy));
+  j["hardness"] = hardness_of(anatomy);
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;
   if (s.bodies > 1) j["bodies"] = s.bodies;
@@ -221,9 +233,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                      {"washed_away", s.dust->washed_mm3},
                      {"fallen_out_of_reach", s.dust->fallen_mm3}};
   }
-  if (anatomy.structures) {
-    j["structures"] = ordered_json::parse(structures_json(s.structures, *anatomy.structures, rate_hz));
-  }
+  if (anatomy.structures) j["structures"] = structures_of(s.structures, *anatomy.structures, rate_hz);
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

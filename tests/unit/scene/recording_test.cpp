@@ -17,6 +17,7 @@
 #include "osteo/base/files.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/scene/session_folder.h"
+#include "stalling_disk.h"
 
 // Sanitizers have an allocator of their own.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -139,31 +140,6 @@ TEST(Recording, TheLastActionIsRecorded) {
   fs::remove(file);
 }
 
-struct Gate {
-  std::mutex mutex;
-  std::condition_variable wake;
-  bool closed = false;
-  void close(bool on) {
-    const std::lock_guard lock(mutex);
-    closed = on;
-    wake.notify_all();
-  }
-};
-class GatedSink final : public SessionSink {
- public:
-  GatedSink(Gate& gate, const fs::path& path) : gate_(gate), file_(session_file(path)) {}
-  void write(std::span<const std::byte> bytes) override {
-    std::unique_lock lock(gate_.mutex);
-    gate_.wake.wait(lock, [&] { return !gate_.closed; });
-    file_->write(bytes);
-  }
-  void sync() override { file_->sync(); }
-
- private:
-  Gate& gate_;
-  std::unique_ptr<SessionSink> file_;
-};
-
 // A servo whose disk stalls while it drills and while the bone is taken apart.
 TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   const auto file = fresh("gap.oss");
@@ -174,12 +150,12 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   ScriptedDevice device(strokes(2), 1000);
   Stream stream;
   StreamReader& reader = stream.add_reader(Recorder::kTickCapacity);
-  Gate gate;
+  test::Disk disk;
   SessionHeader header;
   header.program_version = "test";
   header.bone_hash = world.hash();
   header.haptics = setup;
-  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<GatedSink>(gate, file), header, 32 << 10);
+  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<test::StallingSink>(disk, file), header, 32 << 10);
   Operation operation(std::move(world), setup, {}, device, stream, 1000);
   recorder->start();
   bool closed = false;
@@ -193,7 +169,7 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
     if (t == 1100) ASSERT_TRUE(operation.act(SceneAction::move(1, {{}, {0.2, 0.1, 0}})).done);
     if (t == 500 || t == 1400) {
       taken();
-      gate.close(closed = t == 500);
+      disk.stall(closed = t == 500);
       taken();
     }
     ASSERT_TRUE(operation.step(0));

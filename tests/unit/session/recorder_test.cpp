@@ -13,6 +13,7 @@
 
 #include "osteo/base/files.h"
 #include "osteo/session/recorder.h"
+#include "stalling_disk.h"
 
 namespace osteo {
 namespace {
@@ -30,37 +31,8 @@ SessionHeader header() {
   return h;
 }
 
-// A disk that takes nothing while it stalls.
-struct Disk {
-  std::mutex mutex;
-  std::condition_variable wake;
-  bool stalls = false;
-  void stall(bool on) {
-    const std::lock_guard lock(mutex);
-    stalls = on;
-    wake.notify_all();
-  }
-};
-class StallingSink final : public SessionSink {
- public:
-  StallingSink(Disk& disk, const fs::path& path) : disk_(disk), file_(session_file(path)) {}
-  void write(std::span<const std::byte> bytes) override {
-    wait();
-    file_->write(bytes);
-  }
-  void sync() override {
-    wait();
-    file_->sync();
-  }
-
- private:
-  void wait() {
-    std::unique_lock lock(disk_.mutex);
-    disk_.wake.wait(lock, [&] { return !disk_.stalls; });
-  }
-  Disk& disk_;
-  std::unique_ptr<SessionSink> file_;
-};
+using test::Disk;
+using test::StallingSink;
 
 // A servo that drills: each tick changes voxels, and takes an action now and then.
 class Servo {
