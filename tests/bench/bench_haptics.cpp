@@ -1,4 +1,6 @@
 // Haptic rendering: speed against error, stability, removal, real time. Prints Markdown for docs/haptics.md.
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -443,7 +445,7 @@ void bench_real_time() {
       for (int i = 0; i <= 100; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 3 - 0.04 * i}, true});
       ScriptedDevice device(script, hz);
       Stream stream;
-      const auto path = std::filesystem::temp_directory_path() / "osteo-bench-session.oss";
+      const auto path = std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
       std::filesystem::remove(path);
       Recorder recorder(stream.add_reader(), path, {});
       Servo servo(renderer, device, stream, hz);
@@ -471,7 +473,7 @@ void bench_real_time() {
       granted ? "granted" : "refused");
   Stream stream;
   auto& reader = stream.add_reader();
-  const auto path = std::filesystem::temp_directory_path() / "osteo-bench-session.oss";
+  const auto path = std::filesystem::temp_directory_path() / ("osteo-bench-session-" + std::to_string(::getpid()) + ".oss");
   std::filesystem::remove(path);
   Recorder recorder(reader, path, {});
   recorder.start();

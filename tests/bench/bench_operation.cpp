@@ -1,4 +1,6 @@
 // Scenes that are operated on: how soon the picture follows the drill, pieces live, plates, regions of interest.
+#include <unistd.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -116,7 +118,7 @@ void pieces(const BrickGrid& bone, const Context& context) {
     o.haptics.device = SpringHand::traits();
     o.actions = {SceneAction::saw(cut), SceneAction::split(50), SceneAction::plain(ActionKind::undo)};
     for (std::size_t i = 0; i < o.actions.size(); ++i) o.actions[i].tick = 500 + 700 * i;
-    o.session_file = std::filesystem::temp_directory_path() / "osteo_bench_split.oss";
+    o.session_file = std::filesystem::temp_directory_path() / ("osteo-bench-split-" + std::to_string(::getpid()) + ".oss");
     std::filesystem::remove(o.session_file);
     Rehearsal r(World(BrickGrid(bone)), std::make_unique<ScriptedDevice>(script, 1000), o, context);
     r.start();
