@@ -9,6 +9,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <utility>
 
 #include "mcap_writer.h"
 #include "osteo/base/error.h"
@@ -116,7 +117,7 @@ class OutFile {
   }
   [[noreturn]] void fail() const {
     throw Error(ExitCode::cannot_write, "cannot write '" + shown_.string() + "': " + std::strerror(errno),
-                errno == ENOSPC ? "free some space, or write to another disk" : "choose a folder that you may write to");
+                errno == ENOSPC || errno == EFBIG ? "free some space, or write to another disk" : "choose a folder that you may write to");
   }
   fs::path shown_;
   int fd_ = -1;
@@ -227,6 +228,8 @@ void mcap(const Session& s, OutFile& out, const Context& context) {
 class Hdf5 {
  public:
   explicit Hdf5(const fs::path& path) {
+    // A file that could not be flushed for want of room stays half open in the library, which would crash on it at exit.
+    H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     need(file_ >= 0);
@@ -237,8 +240,8 @@ class Hdf5 {
   Hdf5(const Hdf5&) = delete;
   Hdf5& operator=(const Hdf5&) = delete;
   void close() {
-    need(H5Fclose(file_) >= 0);
-    file_ = -1;
+    // Once: a file that could not be flushed is gone all the same.
+    need(H5Fclose(std::exchange(file_, -1)) >= 0);
   }
   void group(const char* name) {
     const hid_t g = H5Gcreate2(file_, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -394,9 +397,11 @@ void export_session(const Session& s, const fs::path& path, const Context& conte
     });
   };
   if (ending == ".csv") {
-    // Both are whole before the first takes its name.
-    streamed(path, [&](OutFile& out) {
+    // Both are whole, and closed, before the first takes its name.
+    write_atomically(path, [&](const fs::path& temporary) {
+      OutFile out(temporary, path);
       csv(s, out, context);
+      out.close();
       streamed(export_files(path)[1], [&](OutFile& actions) { actions_csv(s, actions); });
     });
   } else if (ending == ".mcap") {

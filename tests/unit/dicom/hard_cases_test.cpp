@@ -123,6 +123,16 @@ TEST(HardCase, C05_OneThinTiltedSliceMissing) {
   expect_every_slice_in_its_place(r.image, s.folder);
 }
 
+// From a twentieth of a degree on they are resampled upright and it is told; below, nothing moves by as much as anyone could see.
+TEST(HardCase, C05_TheLeastTiltThatIsTold) {
+  constexpr double kPerDegree = 3.14159265358979 / 180;
+  Series leaning("c05-least", slices(0, 12)), straight("c05-less", slices(0, 12));
+  lean(leaning, 0.75, std::tan(0.06 * kPerDegree));
+  lean(straight, 0.75, std::tan(0.04 * kPerDegree));
+  EXPECT_TRUE(load(leaning.folder).verdict.has(code::tilted));
+  EXPECT_FALSE(load(straight.folder).verdict.has(code::tilted));
+}
+
 TEST(HardCase, C06_OneOfSixtyMissing) {
   Series s("c06", slices(0, 60));
   s.drop("030");

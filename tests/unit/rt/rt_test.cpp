@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <ctime>
+#include <filesystem>
+#include <iterator>
 #include <random>
 #include <stdexcept>
 #include <thread>
@@ -137,6 +140,23 @@ TEST(Loop, HandsOverWhatItsFunctionThrows) {
   EXPECT_FALSE(loop.running());
   ASSERT_TRUE(loop.failure());
   EXPECT_THROW(std::rethrow_exception(loop.failure()), std::runtime_error);
+}
+
+// The file that keeps cores awake too.
+TEST(Loop, LeavesNoFileOpenAndNoThread) {
+  const auto entries = [](const char* folder) {
+    return std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator());
+  };
+  const auto files = entries("/proc/self/fd"), threads = entries("/proc/self/task");
+  std::atomic<int> calls{0};
+  {
+    FixedRateLoop loop(1000, [&](std::int64_t) { return ++calls > 0; });
+    loop.start();
+    while (calls < 3) std::this_thread::yield();
+    // Nobody waits for it: it ends by itself.
+  }
+  EXPECT_EQ(entries("/proc/self/fd"), files);
+  EXPECT_EQ(entries("/proc/self/task"), threads);
 }
 
 // Memory that may be locked is limited: the loop must not make others run out of it.
