@@ -133,6 +133,19 @@ TEST(HardCase, C05_TheLeastTiltThatIsTold) {
   EXPECT_FALSE(load(straight.folder).verdict.has(code::tilted));
 }
 
+// A table that moved sideways between slices as far apart as ever: that, and not uneven gaps.
+TEST(HardCase, C05_SlicesShiftedSideways) {
+  Series s("c05-sideways", slices(0, 12));
+  s.edit_all([](DcmDataset& d, int i) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x + (i % 3 == 0 ? 0.4 : 0), p.y, p.z}));
+  });
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::shifted_sideways));
+  EXPECT_FALSE(r.verdict.has(code::gaps_uneven));
+  expect_every_slice_in_its_place(r.image, s.folder);
+}
+
 TEST(HardCase, C06_OneOfSixtyMissing) {
   Series s("c06", slices(0, 60));
   s.drop("030");

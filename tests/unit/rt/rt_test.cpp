@@ -128,6 +128,7 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   EXPECT_GE(loop.stats().missed_by_machine, 5u);
   EXPECT_GE(monotonic_ns() - begin, 60'000'000);
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
+  EXPECT_EQ(loop.realtime(), loop.stats().realtime_granted);
 }
 
 TEST(Loop, HandsOverWhatItsFunctionThrows) {
