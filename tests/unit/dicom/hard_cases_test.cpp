@@ -146,6 +146,23 @@ TEST(HardCase, C05_SlicesShiftedSideways) {
   expect_every_slice_in_its_place(r.image, s.folder);
 }
 
+// Where a finer run lies between wider slices, a skipped number tells a missing slice that distances alone would not.
+TEST(HardCase, C06_MissingByItsNumberInAFinerRun) {
+  Series s("c06-number", slices(0, 24));
+  double z = 0;
+  s.edit_all([&](DcmDataset& d, int i) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, p.y, z}));
+    put(d, DCM_InstanceNumber, std::to_string(i + 1));
+    z += i >= 10 && i < 14 ? 1 : 2;
+  });
+  EXPECT_FALSE(load(s.folder).verdict.has(code::slices_missing));
+  s.drop("012");
+  const Imported r = load(s.folder);
+  EXPECT_TRUE(r.verdict.has(code::slices_missing));
+  EXPECT_EQ(only_gap(r.verdict).after, "011");
+}
+
 TEST(HardCase, C06_OneOfSixtyMissing) {
   Series s("c06", slices(0, 60));
   s.drop("030");
