@@ -130,7 +130,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
   Rehearsal rehearsal(std::move(world), std::move(device), options, io.context);
   const auto draw = [&](const char* name) {
-    rehearsal.look([&](const World& w, Follower& f) {
+    rehearsal.look([&](const World& w, SceneReaders& f) {
       save_picture(draw_world(w, f, rehearsal.structures(), view, rehearsal.soft()), folder / name);
     });
   };
@@ -182,7 +182,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   }
   TriMesh after;
   draw("after.png");
-  rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
+  rehearsal.look([&](const World& w, SceneReaders&) { after = surface_of(w, io.context); });
   save_surface(after, folder / "surface.ply");
   io.end_progress();
   if (!io.common.quiet) {
@@ -308,7 +308,7 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
   const Case the_case = load_case(session.case_folder);
   const World world = world_at_end(session, the_case, {}, io.context);
   const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
-  Follower follower(world, {true, false, false}, 1000, io.context);
+  SceneReaders readers(world, {}, 1000, io.context);
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
   for (const auto& q : surface_of(world, io.context).points_mm) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -317,7 +317,7 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
     }
   }
   const WorldPicture view{(lo + hi) * 0.5, 0.36 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
-  const auto picture = draw_world(world, follower, nullptr, view);
+  const auto picture = draw_world(world, readers, nullptr, view);
   std::string text;
   write_folder_atomically(folder, {}, [&](const fs::path& whole) {
     text = write_plan(world, whole, io.context);

@@ -114,8 +114,8 @@ RigidTransform SceneAction::transform() const {
 }
 
 std::string_view name_of(ActionKind kind) {
-  static constexpr std::array<std::string_view, 14> kNames{"?",      "hold",   "resume", "saw",     "split",    "move", "grip",
-                                                           "attach", "detach", "open",   "suction", "irrigate", "undo", "yield"};
+  static constexpr std::array<std::string_view, 15> kNames{"?",      "hold", "resume",  "saw",      "split", "move",  "grip",  "attach",
+                                                           "detach", "open", "suction", "irrigate", "undo",  "yield", "stroke"};
   const auto n = static_cast<std::size_t>(kind);
   return kNames[n < kNames.size() ? n : 0];
 }

@@ -1,6 +1,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstring>
+#include <deque>
 
 #include "osteo/base/error.h"
 #include "osteo/scene/rehearsal.h"
@@ -20,12 +21,19 @@ void apply(const Session& session, World& world, Applied& done, std::size_t chan
       const VoxelChange& c = session.changes[done.changes];
       const PlacedBody* const b = world.owner(c.voxel);
       if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-      b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
+      BrickGrid& bone = b->body->bone;
+      const VoxelKey own = c.voxel - b->body->name_of(0);
+      // The last density of a voxel before each action is enough: strokes end at actions, and what was before them is in the bone.
+      const VoxelChange change{c.voxel, c.density, bone.value(own)};
+      bone.set(own, c.density);
+      world.tell({&change, 1});
     }
   };
   for (; done.actions < actions_end; ++done.actions) {
     apply_until(session.actions[done.actions].changes_before);
-    world.act(session.actions[done.actions].action);
+    const SceneAction& action = session.actions[done.actions].action;
+    if (!action.is(ActionKind::stroke)) world.act(action);
+    world.tell(action);
   }
   apply_until(changes_end);
 }
@@ -38,7 +46,7 @@ void apply_recorded(const Session& session, World& world, const Gap* until) {
         until ? until->actions_before : session.actions.size());
 }
 
-ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context) {
+ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context, std::span<Reader* const> readers) {
   const auto begin = std::chrono::steady_clock::now();
   ReplayResult result;
   if (start.hash() != session.header.bone_hash) {
@@ -65,42 +73,59 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   ReplayDevice device(std::move(samples));
   Stream stream;
   StreamReader& reader = stream.add_reader();
-  // Dust follows from the stream, so it has to come out the same as well.
-  StreamReader* const dust_reader = session.header.dust ? &stream.add_reader() : nullptr;
   Operation operation(std::move(start), session.header.haptics, anatomy, device, stream, session.header.rate_hz);
-  std::unique_ptr<Follower> dust;
-  if (dust_reader != nullptr)
-    dust = std::make_unique<Follower>(operation.world(), FollowerParts{false, false, true}, session.header.rate_hz, context);
+  // As live: undo knows the strokes, dust follows from the stream and has to come out the same as well.
+  ReaderHub hub(stream.add_reader(), operation.world());
+  hub.add(operation.strokes(), false);
+  SceneReaders own(operation.world(), {false, false, session.header.dust}, session.header.rate_hz, context);
+  own.add_to(hub);
+  for (Reader* const r : readers) hub.add(*r);
   std::vector<VoxelChange> changes(1 << 16);
   SceneAction action;
   const auto differ = [&](const std::string& what) {
     if (result.difference.empty()) result.difference = what;
   };
   auto next = session.actions.begin();
+  // What the servo tells of itself is not done again, but has to come again.
+  std::deque<std::uint64_t> strokes;
+  const auto told = [&] {
+    while (reader.actions.pop({&action, 1}) > 0) {
+      if (action.is(ActionKind::stroke)) strokes.push_back(action.tick);
+    }
+  };
   const auto act = [&] {
-    if (dust) dust->drain(*dust_reader);
+    hub.drain();
     const bool scene = !next->action.is(ActionKind::hold) && !next->action.is(ActionKind::resume);
     const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) {
-      if (dust && scene) dust->follow(operation.world(), e);
+      if (scene) hub.scene_changed(e);
     });
     if (!effect.done)
       differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(static_cast<ActionKind>(next->action.kind))) +
              "' could not be done: " + effect.message);
     ++next;
   };
+  const auto expect_strokes = [&](std::uint64_t tick) {
+    for (; next != actions_end && next->action.is(ActionKind::stroke) && next->action.tick <= tick; ++next) {
+      if (strokes.empty() || strokes.front() != next->action.tick) {
+        differ("the stroke that ended at tick " + std::to_string(next->action.tick) + " came out differently");
+      } else {
+        strokes.pop_front();
+      }
+    }
+  };
   for (const TickRecord& recorded : repeated) {
     if (recorded.tick % 256 == 0) {
       context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(repeated.size()), "replay");
-      if (dust) dust->drain(*dust_reader);
+      hub.drain();
     }
-    if (next != actions_end && next->action.tick == recorded.tick) act();
+    if (next != actions_end && next->action.tick == recorded.tick && !next->action.is(ActionKind::stroke)) act();
     operation.step(0);
     TickRecord now;
     reader.ticks.pop({&now, 1});
     while (reader.changes.pop(changes) > 0) {
     }
-    while (reader.actions.pop({&action, 1}) > 0) {
-    }
+    told();
+    expect_strokes(recorded.tick);
     // Bytes, not numbers: the same bits or not.
     constexpr std::size_t kRepeated = offsetof(TickRecord, work_us);
     const bool same = std::memcmp(&now, &recorded, kRepeated) == 0;
@@ -108,6 +133,9 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     result.removed_mm3 += static_cast<double>(now.removed_mm3);
   }
   for (; next != actions_end; operation.finish()) act();  // done in the last moment
+  if (!strokes.empty()) differ("a stroke ended at tick " + std::to_string(strokes.front()) + " that was not recorded");
+  hub.drain();
+  hub.end(repeated.size());
   result.ticks = session.ticks.size();
   result.ticks_repeated = repeated.size();
   result.actions = session.actions.size();
@@ -124,13 +152,8 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   for (std::size_t t = repeated.size(); t < session.ticks.size(); ++t)
     result.removed_mm3 += static_cast<double>(session.ticks[t].removed_mm3);
   result.bone_hash = from_changes.hash();
-  const Follower surfaces(from_changes, {true, false, false}, session.header.rate_hz, context);
-  result.surface_hash = surfaces.surface_hash();
-  if (dust && gap == nullptr) {
-    dust->drain(*dust_reader);
-    dust->end(*dust_reader, repeated.size());
-    result.dust_hash = dust->dust()->hash();
-  }
+  result.surface_hash = SurfaceReader(from_changes, context).hash();
+  if (own.dust && gap == nullptr) result.dust_hash = own.dust->dust().hash();
   result.complete = session.end.has_value();
   if (session.end && known == nullptr) {
     if (!session.end->bone_hash.empty() && session.end->bone_hash != result.bone_hash) differ("the bone came out differently");

@@ -32,6 +32,13 @@ struct FrameHead {
   std::uint32_t magic, type, bytes, crc;
 };
 
+// Of a VoxelChange what a file keeps: what was before follows from what is written before.
+struct StoredChange {
+  std::uint32_t voxel;
+  float density;
+};
+static_assert(sizeof(StoredChange) == 8);
+
 std::uint32_t checksum(std::uint32_t type, std::span<const std::byte> payload) {
   uLong crc = ::crc32(0, reinterpret_cast<const Bytef*>(&type), sizeof type);
   crc = ::crc32(crc, reinterpret_cast<const Bytef*>(payload.data()), static_cast<uInt>(payload.size()));
@@ -195,8 +202,10 @@ void SessionWriter::append(std::span<const TickRecord> ticks, std::span<const Vo
     coalesced_[kept++] = coalesced_[i];
   }
   coalesced_.resize(kept);
+  std::vector<StoredChange> stored;
+  for (const VoxelChange& c : coalesced_) stored.push_back({c.voxel, c.density});
   for (std::size_t i = 0; i < kept; i += kMostRecords)
-    frame(kChanges, std::as_bytes(std::span(coalesced_).subspan(i, std::min(kMostRecords, kept - i))));
+    frame(kChanges, std::as_bytes(std::span(stored).subspan(i, std::min(kMostRecords, kept - i))));
   write();
 }
 
@@ -276,7 +285,9 @@ class Reading {
       }
       unchanged_from_ = changed > 0 ? first : kNone;
     } else if (f.type == kChanges) {
-      append_records(s_.changes, records<VoxelChange>(f));
+      std::vector<StoredChange> changes;
+      append_records(changes, records<StoredChange>(f));
+      for (const StoredChange& c : changes) s_.changes.push_back({c.voxel, c.density});
       unchanged_from_ = kNone;
     } else if (f.type == kActions) {
       std::vector<SceneAction> actions;

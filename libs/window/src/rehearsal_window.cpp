@@ -149,8 +149,8 @@ class RehearsalWindow {
     Rehearsal& rehearsal = *actions_.rehearsal();
     world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
     Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    rehearsal.look([&](const World& world, Follower& follower) {
-      world_view_->update(world, follower);
+    rehearsal.look([&](const World& world, SceneReaders& readers) {
+      world_view_->update(world, readers);
       const BrickGrid& bone = world.bodies().front().body->bone;
       for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
         const Ijk o = bone.brick_coordinate(b);
@@ -278,7 +278,7 @@ class RehearsalWindow {
     const auto drill = static_cast<std::size_t>(tool_);
     ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
     std::optional<FreeWays> ways;
-    rehearsal.look([&](const World& world, Follower&) { ways.emplace(world, std::move(skin)); });
+    rehearsal.look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin)); });
     return *std::move(ways);
   }
 
@@ -331,7 +331,7 @@ class RehearsalWindow {
     // The bone under the mouse: a ray through the live voxels.
     const Vec3 eye = view_axes().eye_mm, forward = normalized(unproject(x, y, centre_) - eye);
     std::optional<BoneHit> hit;
-    rehearsal.look([&](const World& world, Follower&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
+    rehearsal.look([&](const World& world, SceneReaders&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
     if (!hit) {
       say("no bone under the mouse");
       return;
@@ -468,8 +468,8 @@ class RehearsalWindow {
     Rehearsal& now = *actions_.rehearsal();
     cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) draw_help(show_help_, width_);
-    now.look([&](const World& world, Follower& follower) {
-      world_view_->update(world, follower);
+    now.look([&](const World& world, SceneReaders& readers) {
+      world_view_->update(world, readers);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
     });
     world_view_->highlight(tools_->piece());
@@ -837,7 +837,7 @@ class RehearsalWindow {
     if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !failure_) {
       state.tick = rehearsal->latest();
       state.removed_mm3 = rehearsal->removed_mm3();
-      rehearsal->look([&](const World& world, Follower&) {
+      rehearsal->look([&](const World& world, SceneReaders&) {
         state.bodies = world.bodies().size();
         state.fixtures = world.fixtures().size();
         state.undo_steps = world.undo_steps();

@@ -177,8 +177,8 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   }
   operation.finish();
   const World& end = operation.world();
-  const Follower surface(end, {true, false, false}, 1000, {});
-  recorder->finish({2000, end.hash(), surface.surface_hash(), operation.removed_mm3(), {}});
+  const SurfaceReader surface(end, {});
+  recorder->finish({2000, end.hash(), surface.hash(), operation.removed_mm3(), {}});
   recorder.reset();
   const Session s = read_session(file);
   ASSERT_EQ(s.gaps.size(), 1u);
@@ -195,7 +195,7 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   EXPECT_EQ(r.ticks, s.ticks.size());
   EXPECT_EQ(r.losses.size(), 1u);
   EXPECT_EQ(r.bone_hash, end.hash());
-  EXPECT_EQ(r.surface_hash, surface.surface_hash());
+  EXPECT_EQ(r.surface_hash, surface.hash());
   EXPECT_NEAR(r.removed_mm3, removed, 1e-9);
   World resumed = start.copy();
   apply_recorded(s, resumed);
@@ -221,10 +221,12 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
     StreamReader& reader = stream.add_reader(128, 1 << 21);
     const double before = world.volume_mm3();
     Operation operation(std::move(world), setup, {}, device, stream, 1000);
-    Follower follower(operation.world(), {true, true, true}, 1000, {});
+    ReaderHub hub(reader, operation.world());
+    SceneReaders readers(operation.world(), {true, true, true}, 1000, {});
+    readers.add_to(hub);
     const auto act = [&](const SceneAction& a) {
-      follower.drain(reader);
-      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { follower.follow(operation.world(), e); }).done);
+      hub.drain();
+      ASSERT_TRUE(operation.act(a, [&](const World::Effect& e) { hub.scene_changed(e); }).done);
     };
     for (std::uint64_t t = 0; t < 2000; ++t) {
       const bool asleep = (t > 300 && t < 1500) || t > 1800;
@@ -232,20 +234,20 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
       if (t == 290 && apart) act(SceneAction::split(20));
       if (t == 1600) act(SceneAction::suction({4, 0, 4}, 2, 1));
       ASSERT_TRUE(operation.step(0));
-      if (!asleep && t % 16 == 0) follower.drain(reader);
+      if (!asleep && t % 16 == 0) hub.drain();
     }
     operation.finish();
-    follower.drain(reader);
-    follower.end(reader, 2000);
-    EXPECT_GT(follower.ticks_lost(), 1000u);
-    EXPECT_EQ(follower.ticks_lost(), reader.dropped.load());
-    const Follower fresh_one(operation.world(), {true, true, false}, 1000, {});
-    EXPECT_EQ(follower.surface_hash(), fresh_one.surface_hash());
-    EXPECT_EQ(follower.large_pieces().size(), fresh_one.large_pieces().size());
+    hub.drain();
+    hub.end(2000);
+    EXPECT_GT(hub.ticks_lost(), 1000u);
+    EXPECT_EQ(hub.ticks_lost(), reader.dropped.load());
+    const SceneReaders fresh_one(operation.world(), {true, true, false}, 1000, {});
+    EXPECT_EQ(readers.surface_hash(), fresh_one.surface_hash());
+    EXPECT_EQ(readers.large_pieces().size(), fresh_one.large_pieces().size());
     EXPECT_GT(operation.removed_mm3(), 2);
-    const Dust::Totals d = follower.dust()->totals();
+    const Dust::Totals d = readers.dust->dust().totals();
     EXPECT_NEAR(d.added_mm3, before - operation.world().volume_mm3(), 1e-2);
-    EXPECT_NEAR(d.added_mm3, operation.removed_mm3() + follower.sawn_mm3(), 1e-2);
+    EXPECT_NEAR(d.added_mm3, operation.removed_mm3() + readers.tools.sawn_mm3(), 1e-2);
     EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.sucked_mm3 + d.washed_mm3 + d.fallen_mm3, 1e-9);
   }
 }

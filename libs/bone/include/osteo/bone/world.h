@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -30,8 +32,9 @@ enum class ActionKind : std::uint32_t {
   open,      ///< set the gap of a distractor
   suction,   ///< a sucker at a place; rate 0: away
   irrigate,  ///< water at a place; share 0: away
-  undo,      ///< take back the last saw, split, move, attach, detach or open
+  undo,      ///< take back the last stroke of the burr, saw, split, move, attach, detach or open
   yield,     ///< what soft tissue pushes with near the tool, until the next of these
+  stroke,    ///< told by the servo itself: a stroke of the burr has ended (Servo). Nothing to be done
 };
 
 /// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
@@ -67,6 +70,14 @@ static_assert(sizeof(SceneAction) == 120);
 
 /// "hold", "saw", ...; "?" for what is none.
 [[nodiscard]] std::string_view name_of(ActionKind kind);
+
+/// A voxel's new density; the name is that of the stream (Body::name_of). Session files keep the two, not what it was before.
+struct VoxelChange {
+  VoxelKey voxel = 0;
+  float density = 0;
+  float before = 0;  ///< its density before this change
+};
+static_assert(sizeof(VoxelChange) == 12);
 
 /// A piece of bone and where it is. The grid never moves: a pose carries it into the world.
 struct Body {
@@ -119,7 +130,7 @@ class World {
   [[nodiscard]] const RigidTransform& grip() const { return grip_; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
-  [[nodiscard]] std::size_t undo_steps() const { return done_.size(); }
+  [[nodiscard]] std::size_t undo_steps() const;
 
   struct Effect {
     bool done = true;
@@ -145,6 +156,17 @@ class World {
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
 
+  /// What the servo's stream tells, in its order, so that undo knows the strokes of the burr and which of them came before an action. Who
+  /// changes densities without a servo (from a session file) tells the same. A stroke goes from the first voxel changed to
+  /// ActionKind::stroke or to the next action that undo can take back, whichever comes first.
+  /// Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more than kMostStrokeBytes, the
+  /// oldest is forgotten, with all that came before it: undo goes back to there and no farther, and says so.
+  void tell(std::span<const VoxelChange> changes);
+  void tell(const SceneAction& action);
+  /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke that goes on.
+  void forget();
+  static constexpr std::size_t kMostStrokeBytes = std::size_t{64} << 20;
+
   /// Of bodies, poses and fixtures; the bone's own hash where there is one body, unmoved, and nothing on it.
   [[nodiscard]] std::string hash() const;
   /// Density at a point of the world, of whichever body has the most there.
@@ -162,7 +184,8 @@ class World {
   // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since stays drilled.
   struct Done {
     ActionKind kind;
-    std::uint32_t of = 0;  // move: the piece; open: the fixture
+    std::uint32_t of = 0;         // move: the piece; open: the fixture
+    std::vector<Change> drilled;  // stroke: names; of the rest only this
     std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
     std::vector<Fixture> fixtures;
     std::vector<std::pair<std::uint32_t, std::vector<Change>>> sawn;
@@ -175,7 +198,8 @@ class World {
   [[nodiscard]] std::uint32_t not_under_plate(const SceneAction& attach) const;
   void move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by);
   [[nodiscard]] Done snapshot(ActionKind kind, std::uint32_t of = 0) const;
-  void remember(Done done);
+  [[nodiscard]] static bool goes_on(const Done& before, const Done& after);
+  void end_stroke();
   Effect saw(const SceneAction& a);
   Effect split(const SceneAction& a, const ComponentsOf& components);
   Effect undo();
@@ -184,7 +208,14 @@ class World {
 
   std::vector<PlacedBody> bodies_;
   std::vector<Fixture> fixtures_;
+  // Actions are done before the stream tells of them: the first told_ of these it has told of, and strokes come in behind those.
   std::vector<Done> done_;
+  std::size_t told_ = 0;
+  std::vector<Change> stroke_;  // that goes on, by names
+  std::unordered_map<VoxelKey, std::uint32_t> in_stroke_;
+  bool missed_ = false;  // since something was missed, nothing has come that surely begins a new step
+  std::size_t stroke_bytes_ = 0;
+  std::uint64_t steps_forgotten_ = 0;
   RigidTransform grip_;
   std::uint32_t plate_ = SceneAction::kNobody;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;

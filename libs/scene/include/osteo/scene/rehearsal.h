@@ -9,11 +9,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "osteo/rt/loop.h"
-#include "osteo/scene/follower.h"
 #include "osteo/scene/operation.h"
+#include "osteo/scene/scene_readers.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
 
@@ -24,7 +25,7 @@ struct RehearsalOptions {
   HapticSetup haptics;
   Anatomy anatomy;                     ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
-  FollowerParts follow;                ///< what is kept up beside the servo
+  ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
   std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
 };
@@ -53,8 +54,9 @@ struct RehearsalSummary {
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
   double voxel_mm3 = 0;                                 ///< turns the mass of a piece into a volume
-  std::vector<LiveComponents::Component> pieces;  ///< of at least Follower::kLeastPieceMm3, largest first; empty unless they were followed
-  std::size_t bodies = 1;                         ///< that move on their own
+  std::vector<LiveComponents::Component>
+      pieces;              ///< of at least PiecesReader::kLeastPieceMm3, largest first; empty unless they were followed
+  std::size_t bodies = 1;  ///< that move on their own
   std::vector<Fixture> fixtures;
   std::optional<LoopStats> loop;      ///< only when it ran by the clock
   std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
@@ -65,8 +67,8 @@ struct RehearsalSummary {
   }
 };
 
-/// Owns the world while it runs. The servo thread writes densities; the recorder, the follower and whoever asks for a reader are told
-/// through the stream; the follower's thread changes the scene.
+/// Owns the world while it runs. The servo's thread writes densities; the recorder and the readers are told through the stream; the
+/// follower's thread drains it for all readers and changes the scene. Who holds which lock: docs/threads.md.
 class Rehearsal {
  public:
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
@@ -101,7 +103,7 @@ class Rehearsal {
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
-  /// Parts that hang together, of at least Follower::kLeastPieceMm3, as last seen; 0 unless they are followed.
+  /// Parts that hang together, of at least PiecesReader::kLeastPieceMm3, as last seen; 0 unless they are followed.
   [[nodiscard]] int pieces() const { return pieces_; }
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
@@ -113,7 +115,15 @@ class Rehearsal {
   /// Null where the scene has none; under look() only.
   [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
-  void look(const std::function<void(const World&, Follower&)>& f);
+  void look(const std::function<void(const World&, SceneReaders&)>& f);
+
+  /// From any thread but a reader's own calls, before it starts or while it runs: from now on the follower's thread calls it, first
+  /// resync() with the scene as it is. It must live until remove_reader() has returned, or as long as this. Waits for the lock of look().
+  void add_reader(Reader& reader);
+  /// When it returns, the reader is not called any more.
+  void remove_reader(Reader& reader);
+  /// For whoever reads in a thread of its own, and does not hold up the others then: Stream::add_reader().
+  [[nodiscard]] Stream& stream() { return stream_; }
 
  private:
   void follow();
@@ -129,14 +139,14 @@ class Rehearsal {
   double voxel_mm3_, finest_voxel_mm_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
-  StreamReader* reader_ = nullptr;
   Operation operation_;
+  ReaderHub hub_;
   Seqlock<TickRecord> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
-  std::mutex mutex_;  // of world and follower
-  std::unique_ptr<Follower> follower_;
+  std::mutex mutex_;  // of world and readers
+  std::unique_ptr<SceneReaders> readers_;
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
@@ -167,7 +177,10 @@ struct ReplayResult {
 
 /// Runs the recorded poses and actions through the same servo. `start` and `anatomy` as the session had them: Error(corrupt), Error(usage)
 /// when they are not.
-[[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context);
+/// `readers` are told as they would have been while it was recorded, up to the first gap: resync() with the scene it began with, then every
+/// action and tick. A score, say, needs no more than to be one.
+[[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context,
+                                  std::span<Reader* const> readers = {});
 /// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given.
 /// Error(corrupt).
 void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
