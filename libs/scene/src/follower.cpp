@@ -72,7 +72,7 @@ void Follower::lose(const Dusty& from, VoxelKey own, float density) {
 void Follower::happen(const SceneAction& action) {
   if (action.is(ActionKind::suction)) sucker_ = action;
   if (action.is(ActionKind::irrigate)) water_ = action;
-  if (action.is(ActionKind::hold) || action.is(ActionKind::resume)) return;
+  if (!row_of(action).changes_world) return;
   if (happened_before_ > 0) {
     --happened_before_;
   } else if (!awaited_.empty()) {

@@ -79,12 +79,11 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   auto next = session.actions.begin();
   const auto act = [&] {
     if (dust) dust->drain(*dust_reader);
-    const bool scene = !next->action.is(ActionKind::hold) && !next->action.is(ActionKind::resume);
     const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) {
-      if (dust && scene) dust->follow(operation.world(), e);
+      if (dust) dust->follow(operation.world(), e);
     });
     if (!effect.done)
-      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(static_cast<ActionKind>(next->action.kind))) +
+      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(next->action)) +
              "' could not be done: " + effect.message);
     ++next;
   };

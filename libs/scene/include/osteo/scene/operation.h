@@ -24,7 +24,8 @@ class Operation {
   [[nodiscard]] const World& world() const { return world_; }
   [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
 
-  /// Called when something was done and the servo does not know it yet: bodies that are new are still as they were made.
+  /// Called when the world was changed (ActionRow::changes_world) and the servo does not know it yet: bodies that are new are still as they
+  /// were made.
   using Done = std::function<void(const World::Effect&)>;
   /// In the thread that also steps; at most one action a tick.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
