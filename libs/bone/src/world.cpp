@@ -163,9 +163,8 @@ void World::end_stroke() {
 
 void World::tell(const SceneAction& action) {
   if (action.is(ActionKind::stroke)) return end_stroke();
-  constexpr ActionKind kSteps[] = {ActionKind::saw,    ActionKind::split,  ActionKind::move,
-                                   ActionKind::attach, ActionKind::detach, ActionKind::open};
-  if (told_ == done_.size() || std::none_of(std::begin(kSteps), std::end(kSteps), [&](ActionKind k) { return action.is(k); })) return;
+  const bool is_step = row_of(action).changes_world && !action.is(ActionKind::undo);
+  if (!is_step || told_ == done_.size()) return;
   if (missed_) {
     // Whatever was missed may belong to the same drag: then only its end is known.
     const bool may_go_on = action.is(ActionKind::move) || action.is(ActionKind::open);
@@ -236,15 +235,19 @@ std::uint32_t World::not_under_plate(const SceneAction& attach) const {
 
 World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
   Effect effect;
-  const bool was_held = std::exchange(held_, a.is(ActionKind::hold));
+  const ActionRow& row = row_of(a);
+  if (a.is(ActionKind::hold) || row.ends_hold) held_ = a.is(ActionKind::hold);
   for (const double v : a.values) {
     if (!std::isfinite(v)) return nothing("a number of the action is not finite");
   }
+  if (a.hand >= kMostHands) return nothing("there is no hand " + std::to_string(a.hand));
   const auto known = [&](std::uint32_t id) { return find(id) != nullptr; };
   const auto fixture = std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
   switch (static_cast<ActionKind>(a.kind)) {
     case ActionKind::hold:
     case ActionKind::resume:
+    case ActionKind::soft_push:
+    case ActionKind::setting:
       break;
     case ActionKind::saw:
       return saw(a);
@@ -253,24 +256,17 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::undo:
       return undo();
     case ActionKind::stroke:
-      held_ = was_held;
       return nothing("a stroke ends by itself, when the burr takes no more bone");
     case ActionKind::suction:
     case ActionKind::irrigate:
-      held_ = was_held;
       if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
         return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
                        " mm make sense");
       break;
-    case ActionKind::yield:
-      held_ = was_held;
-      break;
     case ActionKind::grip:
-      held_ = was_held;
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
       if (a.item != SceneAction::kNobody && a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));
-      plate_ = a.item;
-      grip_ = a.transform();
+      grips_[a.hand] = {a.item, a.transform()};
       break;
     case ActionKind::move: {
       if (!known(a.body)) return nothing("there is no piece " + std::to_string(a.body));
@@ -298,7 +294,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       f.other = a.other;
       f.body_from_plate = find(a.body)->world_from_body.inverse() * a.transform();
       fixtures_.push_back(f);
-      plate_ = SceneAction::kNobody;
+      grips_[a.hand].plate = SceneAction::kNobody;
       break;
     }
     case ActionKind::detach:
@@ -324,7 +320,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       break;
     }
     default:
-      return nothing("unknown action " + std::to_string(a.kind));
+      return nothing("unknown action " + std::to_string(a.kind) + ": a kind that this version does not have");
   }
   return effect;
 }

@@ -16,7 +16,7 @@ void Servo::take_up(std::uint64_t tick) noexcept {
   action.tick = tick;
   if (h->scene != nullptr) renderer_.show(h->scene);
   renderer_.hold(h->held);
-  if (action.is(ActionKind::yield)) renderer_.feel(action);
+  if (action.is(ActionKind::soft_push)) renderer_.feel(action);
   stream_.publish(action);
   inbox_.store(nullptr, std::memory_order_release);
 }

@@ -8,6 +8,11 @@
 namespace osteo {
 
 DustReader::DustReader(const World& world, double rate_hz) : rate_hz_(rate_hz) {
+  begin(world);
+}
+
+void DustReader::begin(const World& world) {
+  bones_.clear();
   for (const PlacedBody& placed : world.bodies())
     bones_.emplace(placed.body->id, Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body, placed.of_region});
   // Dust lies in the first body's grid: a finer region counts there as the bone it holds.
@@ -48,8 +53,7 @@ void DustReader::remove_from_coarse(const Bone& from, VoxelKey own, float densit
 void DustReader::action(const SceneAction& action) {
   if (action.is(ActionKind::suction)) sucker_ = action;
   if (action.is(ActionKind::irrigate)) water_ = action;
-  // Those that nothing was done for.
-  if (action.is(ActionKind::hold) || action.is(ActionKind::resume) || action.is(ActionKind::stroke)) return;
+  if (!row_of(action).changes_world) return;
   if (applied_early_ > 0) {
     --applied_early_;
   } else if (!pending_.empty()) {
@@ -116,11 +120,10 @@ void DustReader::tick(const TickRecord& tick, std::span<const VoxelChange> chang
 
 void DustReader::resync(const World& world) {
   for (; !pending_.empty(); ++applied_early_) apply_next();
-  // Bodies that came or went before this reader did.
-  std::erase_if(bones_, [&](const auto& b) { return world.find(b.first) == nullptr; });
-  for (const PlacedBody& placed : world.bodies())
-    bones_.try_emplace(placed.body->id,
-                       Bone{BrickGrid(placed.body->bone), placed.body->first_brick, placed.world_from_body, placed.of_region});
+  // It was not told of pieces that came or went: it joined behind them, and where their bone is now is not dust.
+  const bool told = bones_.size() == world.bodies().size() &&
+                    std::all_of(bones_.begin(), bones_.end(), [&](const auto& b) { return world.find(b.first) != nullptr; });
+  if (!told) return begin(world);
   std::vector<VoxelChange> changes;
   for (const auto& [id, d] : bones_) {
     const BrickGrid& bone = world.find(id)->body->bone;

@@ -25,7 +25,7 @@ std::size_t ReaderHub::take_actions() {
 }
 
 void ReaderHub::tell(const SceneAction& action) {
-  if (action.is(ActionKind::suction) || action.is(ActionKind::irrigate)) standing_[action.kind] = action;
+  if (row_of(action).moves_dust) standing_[action.kind] = action;
   for (Reader* const r : readers_) r->action(action);
 }
 

@@ -74,9 +74,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   const World::ComponentsOf components = [&](std::uint32_t body) {
     return readers_->pieces ? readers_->pieces->components(body) : nullptr;
   };
-  const Operation::Done done = [&](const World::Effect& e) {
-    if (!action.is(ActionKind::resume)) hub_.scene_changed(e);
-  };
+  const Operation::Done done = [&](const World::Effect& e) { hub_.scene_changed(e); };
   World::Effect effect;
   if (live) {
     // Nobody looks at the scene while it changes; the wait for the servo is of a tick or two.
@@ -91,11 +89,10 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   }
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
   if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(readers_->large_pieces().size());
-  // Soft tissue yields again with its next update.
-  if (!effect.message.empty() && !action.is(ActionKind::yield)) {
+  if (!effect.message.empty() && !row_of(action).made_often) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
-    if (!effect.done) refused_ = std::string(name_of(kind)) + ": " + effect.message;
+    if (!effect.done) refused_ = std::string(name_of(action)) + ": " + effect.message;
     if (!notes_.empty() && notes_.back().kind == kind && notes_.back().done == effect.done && notes_.back().why == effect.message) {
       ++notes_.back().times;
     } else {
@@ -111,19 +108,19 @@ std::optional<SceneAction> Rehearsal::move_soft() {
   const TickRecord& now = hub_.latest();
   if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
-  const auto yield = options_.soft->update(
+  const auto push = options_.soft->update(
       {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.device.drill_on != 0});
   tissue_mm3_ = options_.soft->cut_off_mm3();
-  return yield;
+  return push;
 }
 
 void Rehearsal::act(const SceneAction& action) {
   const std::lock_guard lock(queue_mutex_);
-  // Of several moves of the same kind that nobody has seen yet the last is enough.
-  const bool again = !queue_.empty() && queue_.back().kind == action.kind && queue_.back().body == action.body &&
-                     queue_.back().item == action.item &&
-                     (action.is(ActionKind::move) || action.is(ActionKind::grip) || action.is(ActionKind::open) ||
-                      action.is(ActionKind::suction) || action.is(ActionKind::irrigate));
+  const auto same = [&](const SceneAction& before) {
+    return before.kind == action.kind && before.body == action.body && before.other == action.other && before.item == action.item &&
+           before.hand == action.hand;
+  };
+  const bool again = row_of(action).last_counts && !queue_.empty() && same(queue_.back());
   if (again) {
     queue_.back() = action;
   } else {
@@ -175,7 +172,7 @@ void Rehearsal::follow_on() {
       }
     }
     if (action) {
-      if (perform(*action, true) || action->is(ActionKind::yield)) continue;
+      if (perform(*action, true) || row_of(*action).made_often) continue;
       const std::lock_guard lock(queue_mutex_);
       timed_.push_front(*action);
     } else {
@@ -226,7 +223,7 @@ bool Rehearsal::run_on(const Context& context) {
       // One action a tick: what was to be done comes first.
       lock.lock();
       drain();
-      if (const auto yield = move_soft()) perform(*yield, false);
+      if (const auto push = move_soft()) perform(*push, false);
     }
     if (!operation_.step(0)) return true;
     if (operation_.ticks() % 64 != 0) continue;

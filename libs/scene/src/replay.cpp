@@ -32,7 +32,7 @@ void apply(const Session& session, World& world, Applied& done, std::size_t chan
   for (; done.actions < actions_end; ++done.actions) {
     apply_until(session.actions[done.actions].changes_before);
     const SceneAction& action = session.actions[done.actions].action;
-    if (!action.is(ActionKind::stroke)) world.act(action);
+    if (!row_of(action).by_servo) world.act(action);
     world.tell(action);
   }
   apply_until(changes_end);
@@ -90,22 +90,19 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   std::deque<std::uint64_t> strokes;
   const auto told = [&] {
     while (reader.actions.pop({&action, 1}) > 0) {
-      if (action.is(ActionKind::stroke)) strokes.push_back(action.tick);
+      if (row_of(action).by_servo) strokes.push_back(action.tick);
     }
   };
   const auto act = [&] {
     hub.drain();
-    const bool scene = !next->action.is(ActionKind::hold) && !next->action.is(ActionKind::resume);
-    const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) {
-      if (scene) hub.scene_changed(e);
-    });
+    const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) { hub.scene_changed(e); });
     if (!effect.done)
-      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(static_cast<ActionKind>(next->action.kind))) +
+      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(next->action)) +
              "' could not be done: " + effect.message);
     ++next;
   };
   const auto expect_strokes = [&](std::uint64_t tick) {
-    for (; next != actions_end && next->action.is(ActionKind::stroke) && next->action.tick <= tick; ++next) {
+    for (; next != actions_end && row_of(next->action).by_servo && next->action.tick <= tick; ++next) {
       if (strokes.empty() || strokes.front() != next->action.tick) {
         differ("the stroke that ended at tick " + std::to_string(next->action.tick) + " came out differently");
       } else {
@@ -118,7 +115,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
       context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(repeated.size()), "replay");
       hub.drain();
     }
-    if (next != actions_end && next->action.tick == recorded.tick && !next->action.is(ActionKind::stroke)) act();
+    if (next != actions_end && next->action.tick == recorded.tick && !row_of(next->action).by_servo) act();
     operation.step(0);
     TickRecord now;
     reader.ticks.pop({&now, 1});

@@ -135,10 +135,9 @@ void csv(const Session& s, OutFile& out, const Context& context) {
   }
 }
 
-// The plate or fixture of those actions that have one.
+// The plate, fixture or setting of those actions that have one.
 std::uint32_t item_of(const SceneAction& a) {
-  const bool any = a.is(ActionKind::grip) || a.is(ActionKind::attach) || a.is(ActionKind::detach) || a.is(ActionKind::open);
-  return any ? a.item : SceneAction::kNobody;
+  return row_of(a).item.empty() ? SceneAction::kNobody : a.item;
 }
 
 // A piece, plate or fixture; "" where the action names none.
@@ -152,8 +151,8 @@ void actions_csv(const Session& s, OutFile& out) {
   out.write(line + "\n");
   for (const RecordedAction& r : s.actions) {
     const SceneAction& a = r.action;
-    line = format_number(seconds_of(s, a.tick)) + "," + std::to_string(a.tick) + "," +
-           std::string(name_of(static_cast<ActionKind>(a.kind))) + "," + who(a.body) + "," + who(a.other) + "," + who(item_of(a));
+    line = format_number(seconds_of(s, a.tick)) + "," + std::to_string(a.tick) + "," + std::string(name_of(a)) + "," + who(a.body) + "," +
+           who(a.other) + "," + who(item_of(a));
     for (const double v : a.values) line += "," + format_number(v);
     out.write(line + "\n");
   }
@@ -200,7 +199,7 @@ void mcap(const Session& s, OutFile& out, const Context& context) {
       const SceneAction& a = s.actions[action].action;
       const ordered_json j{{"time_s", seconds_of(s, a.tick)},
                            {"tick", a.tick},
-                           {"action", name_of(static_cast<ActionKind>(a.kind))},
+                           {"action", name_of(a)},
                            {"piece", or_null(a.body)},
                            {"second_piece", or_null(a.other)},
                            {"item", or_null(item_of(a))},
@@ -358,7 +357,7 @@ void hdf5(const Session& s, const fs::path& path, const Context& context) {
   numbers("/actions/time_s", "s", n, [&](std::size_t i) { return seconds_of(s, action(i).tick); });
   integers("/actions/tick", "1", n, [&](std::size_t i) { return action(i).tick; });
   std::vector<std::string> names;
-  for (const RecordedAction& r : s.actions) names.emplace_back(name_of(static_cast<ActionKind>(r.action.kind)));
+  for (const RecordedAction& r : s.actions) names.emplace_back(name_of(r.action));
   file.column("/actions/action", names);
   integers("/actions/piece", "number, -1: none or all", n, [&](std::size_t i) { return or_none(action(i).body); });
   integers("/actions/second_piece", "number, -1: none", n, [&](std::size_t i) { return or_none(action(i).other); });

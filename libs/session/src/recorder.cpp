@@ -9,16 +9,6 @@
 #include "backlog.h"
 
 namespace osteo {
-namespace {
-
-// Whether it matters which densities it finds: all others may as well find those of a little later.
-bool looks_at_bone(const SceneAction& a) {
-  constexpr ActionKind kOthers[] = {ActionKind::hold,    ActionKind::resume,   ActionKind::move, ActionKind::grip,
-                                    ActionKind::suction, ActionKind::irrigate, ActionKind::yield};
-  return std::none_of(std::begin(kOthers), std::end(kOthers), [&](ActionKind k) { return a.is(k); });
-}
-
-}  // namespace
 
 Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header, std::size_t most_waiting_bytes)
     : reader_(reader),
@@ -137,10 +127,10 @@ void Recorder::put(const SceneAction& action) {
   }
   Meanwhile& now = meanwhile();
   now.actions.push_back(action);
-  now.ends = looks_at_bone(action);
+  now.ends = parts_changes(row_of(action));  // all others may as well find the densities of a little later
 }
 
-// What comes now belongs behind an action that looks at bone.
+// What comes now belongs behind an action that parts changes.
 Recorder::Meanwhile& Recorder::meanwhile() {
   if (meanwhile_.empty() || meanwhile_.back().ends) meanwhile_.emplace_back();
   return meanwhile_.back();

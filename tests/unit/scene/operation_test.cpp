@@ -51,10 +51,11 @@ std::vector<SceneAction> everything() {
                    {901, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
                    {1000, SceneAction::open(2, 3)},
                    {1100, SceneAction::irrigate({4, 0, 5}, 5, 2)},
-                   {1200, SceneAction::plain(ActionKind::undo)},
+                   {1200, SceneAction::plain(ActionKind::undo)},  // what was drilled since the distractor was opened
                    {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
                    {1301, SceneAction::split(20)},
-                   {1400, SceneAction::plain(ActionKind::undo)},
+                   {1400, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split
+                   {1400, SceneAction::plain(ActionKind::undo)},  // and that
                    {1401, SceneAction::grip(mini)},
                    {1600, SceneAction::grip(SceneAction::kNobody)}});
 }

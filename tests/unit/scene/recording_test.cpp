@@ -163,10 +163,18 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
     while (reader.ticks.room() < Recorder::kTickCapacity || (!closed && recorder->status().waiting_bytes > 0))
       std::this_thread::sleep_for(std::chrono::microseconds(200));
   };
+  ReaderHub hub(stream.add_reader(), operation.world());
+  hub.add(operation.strokes(), false);
+  const auto act = [&](const SceneAction& a) {
+    hub.drain();
+    ASSERT_TRUE(operation.act(a).done);
+  };
   for (std::uint64_t t = 0; t < 2000; ++t) {
-    if (t == 200) ASSERT_TRUE(operation.act(SceneAction::saw(kCut)).done);
-    if (t == 1000) ASSERT_TRUE(operation.act(SceneAction::split(20)).done);
-    if (t == 1100) ASSERT_TRUE(operation.act(SceneAction::move(1, {{}, {0.2, 0.1, 0}})).done);
+    if (t == 200) act(SceneAction::saw(kCut));
+    if (t == 1000) act(SceneAction::split(20));
+    if (t == 1100) act(SceneAction::move(1, {{}, {0.2, 0.1, 0}}));
+    // What was drilled since the move, and nothing else: known in the gap too.
+    if (t == 1300) act(SceneAction::plain(ActionKind::undo));
     if (t == 500 || t == 1400) {
       taken();
       disk.stall(closed = t == 500);
@@ -185,7 +193,9 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   EXPECT_GE(s.gaps[0].first_tick, 500u);
   EXPECT_LT(s.gaps[0].first_tick, 1000u);
   EXPECT_LE(s.gaps[0].first_tick + s.gaps[0].ticks, 1500u);
-  ASSERT_EQ(s.actions.size(), 3u);
+  ASSERT_EQ(s.actions.size(), 4u);
+  EXPECT_EQ(end.bodies().size(), 2u);
+  EXPECT_EQ(end.bodies()[1].world_from_body.shift_mm, (Vec3{0.2, 0.1, 0}));
   double removed = 0;
   for (const TickRecord& t : s.ticks) removed += static_cast<double>(t.removed_mm3);
   ReplayResult r = replay(s, start.copy(), {}, {});

@@ -11,65 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "osteo/bone/action.h"
 #include "osteo/bone/hardness.h"
 #include "osteo/bone/live_components.h"
 #include "osteo/bone/pieces.h"
-#include "osteo/bone/rigid_transform.h"
-#include "osteo/bone/saw.h"
 
 namespace osteo {
-
-/// What is done to a scene besides drilling.
-enum class ActionKind : std::uint32_t {
-  hold = 1,  ///< nothing may be removed until the next action: something is being prepared
-  resume,    ///< it may again
-  saw,       ///< take out a blade's width
-  split,     ///< take apart what does not hang together
-  move,      ///< put a piece somewhere, and all that is plated to it
-  grip,      ///< take a plate into the hand, turn it, or put it away
-  attach,    ///< fix a plate to one piece or two
-  detach,    ///< take a plate off
-  open,      ///< set the gap of a distractor
-  suction,   ///< a sucker at a place; rate 0: away
-  irrigate,  ///< water at a place; share 0: away
-  undo,      ///< take back the last stroke of the burr, saw, split, move, attach, detach or open
-  yield,     ///< what soft tissue pushes with near the tool, until the next of these
-  stroke,    ///< told by the servo itself: a stroke of the burr has ended (Servo). Nothing to be done
-};
-
-/// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
-struct SceneAction {
-  static constexpr std::uint32_t kNobody = 0xffffffffU;
-  static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
-  static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
-
-  std::uint64_t tick = 0;
-  std::uint32_t kind = 0;         ///< ActionKind
-  std::uint32_t body = kNobody;   ///< id of a piece. saw: only this one, or all. attach: the one that the plate stays with
-  std::uint32_t other = kNobody;  ///< attach: the second piece, which a distractor moves
-  std::uint32_t item = 0;         ///< grip, attach: index in plate_library(), grip: or kNobody; detach, open: id of the fixture
-  std::array<double, 12> values{};
-
-  [[nodiscard]] bool is(ActionKind k) const { return kind == static_cast<std::uint32_t>(k); }
-  static SceneAction plain(ActionKind kind);                                ///< hold, resume, undo
-  static SceneAction saw(const SawCut& cut, std::uint32_t body = kNobody);  ///< in the world
-  static SceneAction split(double least_mm3);
-  static SceneAction move(std::uint32_t body, const RigidTransform& world_from_body);
-  static SceneAction grip(std::uint32_t plate, const RigidTransform& hand_from_plate = {});
-  static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other = kNobody);
-  static SceneAction detach(std::uint32_t fixture);
-  static SceneAction open(std::uint32_t fixture, double opening_mm);
-  static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
-  static SceneAction irrigate(Vec3 at_mm, double radius_mm, double share_per_s);
-  /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
-  static SceneAction yield(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
-  [[nodiscard]] SawCut saw_cut() const;
-  [[nodiscard]] RigidTransform transform() const;
-};
-static_assert(sizeof(SceneAction) == 120);
-
-/// "hold", "saw", ...; "?" for what is none.
-[[nodiscard]] std::string_view name_of(ActionKind kind);
 
 /// A voxel's new density; the name is that of the stream (Body::name_of). Session files keep the two, not what it was before.
 struct VoxelChange {
@@ -124,10 +71,14 @@ class World {
   [[nodiscard]] const PlacedBody* find(std::uint32_t body) const;
   /// The body that a voxel of the stream belongs to; null when there is none.
   [[nodiscard]] const PlacedBody* owner(VoxelKey name) const;
-  /// The plate that the hand holds instead of the drill; kNobody: the drill. attach() leaves the hand empty.
-  [[nodiscard]] std::uint32_t plate_in_hand() const { return plate_; }
-  /// How: the hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
-  [[nodiscard]] const RigidTransform& grip() const { return grip_; }
+  /// A plate that a hand holds instead of its instrument.
+  struct Grip {
+    std::uint32_t plate = SceneAction::kNobody;  ///< index in plate_library(); kNobody: the instrument
+    /// The hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
+    RigidTransform hand_from_plate;
+  };
+  /// `hand` below kMostHands. attach() leaves its hand without a plate.
+  [[nodiscard]] const Grip& grip(std::uint32_t hand = 0) const { return grips_[hand]; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
   [[nodiscard]] std::size_t undo_steps() const;
@@ -216,8 +167,7 @@ class World {
   bool missed_ = false;  // since something was missed, nothing has come that surely begins a new step
   std::size_t stroke_bytes_ = 0;
   std::uint64_t steps_forgotten_ = 0;
-  RigidTransform grip_;
-  std::uint32_t plate_ = SceneAction::kNobody;
+  std::array<Grip, kMostHands> grips_;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
   bool held_ = false;
 };

@@ -11,7 +11,8 @@
 namespace osteo {
 
 /// Moves in tick(), a hundred steps a second, so that a replay ends with the same dust to the bit. What a stroke or a saw left stays dust
-/// when it is taken back. After ticks were lost: what is gone since has become dust, later than it was made.
+/// when it is taken back. After ticks were lost: what is gone since has become dust, later than it was made. One that joins a scene whose
+/// pieces it does not know begins without dust.
 /// Memory: a copy of the bone as of the tick reached, and 2 KB for each brick that holds dust.
 class DustReader final : public Reader {
  public:
@@ -46,6 +47,7 @@ class DustReader final : public Reader {
     std::vector<Bricks> changed;
     std::vector<std::pair<VoxelKey, float>> dust;
   };
+  void begin(const World& world);
   void apply_next();
   Bone* owner(VoxelKey name);
   void remove_from_coarse(const Bone& from, VoxelKey own, float density);

@@ -19,8 +19,8 @@ class Reader {
   /// The scene as it is: the first call of all, unless the reader was made from that scene; and again after ticks or actions were lost.
   /// What follows from the scene has to be made anew. Densities may be ahead of the ticks that come next by what the stream holds.
   virtual void resync(const World& world) { static_cast<void>(world); }
-  /// Something was done to the scene; the stream tells of it later. Bodies that are new are still as they were made. Called for every
-  /// action but hold and resume, also where the effect is empty.
+  /// The world was changed by an action (ActionRow::changes_world) that the stream tells of later. Bodies that are new are still as they
+  /// were made.
   virtual void scene_changed(const World& world, const World::Effect& effect) {
     static_cast<void>(world);
     static_cast<void>(effect);
@@ -68,7 +68,7 @@ class ReaderHub {
   const World& world_;
   std::vector<Reader*> readers_;
   std::deque<SceneAction> actions_;                // taken from the stream, their ticks not yet
-  std::map<std::uint32_t, SceneAction> standing_;  // by kind: what goes on until the next of its kind
+  std::map<std::uint32_t, SceneAction> standing_;  // by kind: what goes on until the next of its kind: sucker, water
   std::vector<TickRecord> ticks_;
   std::vector<VoxelChange> changes_;
   TickRecord latest_;
