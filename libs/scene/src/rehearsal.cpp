@@ -128,6 +128,10 @@ void Rehearsal::act(const SceneAction& action) {
   }
 }
 
+void Rehearsal::note(const std::string& kind, const std::string& json) {
+  if (recorder_) recorder_->note({operation_.ticks(), kind, json});
+}
+
 std::string Rehearsal::take_refusal() {
   const std::lock_guard lock(queue_mutex_);
   return std::exchange(refused_, {});
@@ -137,6 +141,7 @@ std::string Rehearsal::trouble() const {
   const Recorder::Status s = recording();
   if (s.failure) return std::string("recording has ended: ") + s.failure->what();
   if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
+  if (s.notes_lost > 0) return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
   if (s.behind_s > 3) return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
   return device_->trouble();
 }
@@ -295,7 +300,7 @@ RehearsalSummary Rehearsal::finish() {
                          " ticks bone was left at the burr's rim, since too much of the bone is drilled in part to remember it all: larger "
                          "voxels, or a smaller region, need less");
   if (recorder_) {
-    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash}, [&](std::vector<VoxelChange>& all) {
+    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash, 0, 0}, [&](std::vector<VoxelChange>& all) {
       for (const PlacedBody& b : operation_.world().bodies()) {
         const BrickGrid& bone = b.body->bone;
         for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) all.push_back({b.body->name_of(v), bone.value(v)});

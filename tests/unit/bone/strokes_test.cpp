@@ -91,7 +91,7 @@ TEST(Strokes, TheStreamTellsWhatCameFirst) {
   };
   BrickGrid& bone = live.bodies()[0].body->bone;
   std::vector<VoxelChange> changes;
-  for (VoxelKey v = 0; v < 20 * 512 && changes.size() < 2; ++v) {
+  for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels && changes.size() < 2; ++v) {
     if (bone.value(v) == 1) changes.push_back({v, 0.25F, 1});
   }
   ASSERT_EQ(changes.size(), 2u);

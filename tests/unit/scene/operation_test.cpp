@@ -97,7 +97,7 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
       EXPECT_EQ(s.bodies, 2u);
       const Session session = read_session(file);
       EXPECT_GE(session.actions.size(), everything().size());
-      const ReplayResult again = replay(session, start.copy(), {}, {});
+      const ReplayResult again = replay(SessionReader(file), start.copy(), {}, {});
       EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
       EXPECT_TRUE(again.complete);
       EXPECT_EQ(again.bone_hash, s.bone_hash);
@@ -312,7 +312,7 @@ TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
   EXPECT_EQ(s.structures.at(9).ticks_touched, 0u);
   EXPECT_GT(s.structures.at(9).least_clearance_mm, 0.2);
   EXPECT_LT(s.structures.at(9).least_clearance_mm, 5);
-  const ReplayResult again = replay(session, world.copy(), anatomy, {});
+  const ReplayResult again = replay(SessionReader(options.session_file), world.copy(), anatomy, {});
   EXPECT_TRUE(again.identical) << again.difference;
   ASSERT_EQ(again.structures.size(), 2u);
   for (const auto& [value, e] : s.structures) {

@@ -17,6 +17,7 @@
 #include "osteo/scene/scene_readers.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
+#include "osteo/session/session_reader.h"
 
 namespace osteo {
 
@@ -88,6 +89,8 @@ class Rehearsal {
 
   /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
   void act(const SceneAction& action);
+  /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
+  void note(const std::string& kind, const std::string& json);
   /// Why the last action that could not be done was not; once.
   std::string take_refusal();
 
@@ -167,7 +170,8 @@ struct ReplayResult {
   std::vector<std::string> losses;  ///< what the session lacks; see losses()
   bool complete = false;            ///< the session was closed properly
   bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
-  std::string difference;  ///< the first one
+  std::string difference;  ///< the first one, and between which checkpoints it came
+  std::optional<double> difference_since_s;  ///< the last checkpoint where all was the same; 0: the beginning
   std::string bone_hash, surface_hash, dust_hash;
   std::map<std::uint32_t, StructureEvents> structures;  ///< as the session's summary has them
   std::shared_ptr<const World> world;                   ///< as the session left it
@@ -175,15 +179,17 @@ struct ReplayResult {
   double seconds = 0;
 };
 
-/// Runs the recorded poses and actions through the same servo. `start` and `anatomy` as the session had them: Error(corrupt), Error(usage)
-/// when they are not.
+/// Runs the recorded poses and actions through the same servo, a frame at a time: memory does not grow with the session. At each checkpoint
+/// the scene is compared three ways: by poses, by changes, by checkpoints. `start` and `anatomy` as the session had them: Error(corrupt),
+/// Error(usage) when they are not; Error(corrupt) also where this build's servo cannot repeat it (SessionOutline::not_replayable).
 /// `readers` are told as they would have been while it was recorded, up to the first gap: resync() with the scene it began with, then every
-/// action and tick. A score, say, needs no more than to be one.
-[[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context,
+/// action and tick. A score needs no more than to be one.
+[[nodiscard]] ReplayResult replay(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context,
                                   std::span<Reader* const> readers = {});
-/// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given.
-/// Error(corrupt).
-void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
+/// Applies the changes and actions of a session, in their order, to the world it began with. Error(corrupt).
+void apply_recorded(const SessionReader& session, World& world);
+/// The same up to a tick, by way of the checkpoints: the tick that it gives the scene of (SessionReader::scene_at). Error(corrupt).
+std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick);
 
 /// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look like metres, a sucker
 /// or water where there is no dust.
