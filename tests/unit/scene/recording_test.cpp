@@ -156,7 +156,7 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   header.program_version = "test";
   header.bone_hash = world.hash();
   header.haptics = setup;
-  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<test::StallingSink>(disk, file), header, 32 << 10);
+  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<test::StallingSink>(disk, file), header, 8 << 10);
   Operation operation(std::move(world), setup, {}, device, stream, 1000);
   recorder->start();
   bool closed = false;
