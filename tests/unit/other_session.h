@@ -66,8 +66,9 @@ class OtherWriter {
     frame(type, first, end, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
   void finish(const SessionEnd& e) {
-    const nlohmann::ordered_json j{{"ticks", e.ticks},           {"bone_hash", e.bone_hash}, {"surface_hash", e.surface_hash},
-                                   {"removed_mm3", e.removed_mm3}, {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost}};
+    const nlohmann::ordered_json j{
+        {"ticks", e.ticks},         {"bone_hash", e.bone_hash},  {"surface_hash", e.surface_hash}, {"removed_mm3", e.removed_mm3},
+        {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost}};
     frame(kEndFrame, e.ticks, e.ticks, j.dump());
   }
 

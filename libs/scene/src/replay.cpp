@@ -70,8 +70,10 @@ class Replaying {
     result_.actions += part.actions.size();
     if (repeating_) actions_.insert(actions_.end(), part.actions.begin(), part.actions.end());
     for (const TickRecord& t : part.ticks) {
-      if (repeating_) repeat(t);
-      else result_.removed_mm3 += static_cast<double>(t.removed_mm3);
+      if (repeating_)
+        repeat(t);
+      else
+        result_.removed_mm3 += static_cast<double>(t.removed_mm3);
       ++result_.ticks;
     }
     if (part.checkpoint && repeating_) compare_at(*part.checkpoint);

@@ -98,7 +98,8 @@ void put_part(std::vector<std::byte>& out, const RecordTable& table, std::span<c
 std::string line_of(const Note& note) {
   auto value = ordered_json::parse(note.json, nullptr, false);
   if (value.is_discarded()) value = note.json;
-  return ordered_json{{"tick", note.tick}, {"kind", note.kind}, {"value", value}}.dump(-1, ' ', false, ordered_json::error_handler_t::replace) +
+  return ordered_json{{"tick", note.tick}, {"kind", note.kind}, {"value", value}}.dump(-1, ' ', false,
+                                                                                       ordered_json::error_handler_t::replace) +
          "\n";
 }
 
@@ -195,9 +196,9 @@ void SessionWriter::checkpoint() {
 
 void SessionWriter::finish(const SessionEnd& e) {
   checkpoint();
-  const ordered_json j{{"ticks", e.ticks},           {"bone_hash", e.bone_hash}, {"surface_hash", e.surface_hash},
-                       {"removed_mm3", e.removed_mm3}, {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost},
-                       {"notes_lost", e.notes_lost}};
+  const ordered_json j{
+      {"ticks", e.ticks},         {"bone_hash", e.bone_hash},   {"surface_hash", e.surface_hash}, {"removed_mm3", e.removed_mm3},
+      {"dust_hash", e.dust_hash}, {"ticks_lost", e.ticks_lost}, {"notes_lost", e.notes_lost}};
   frame(kEndFrame, e.ticks, e.ticks, bytes_of(j.dump()));
   sync();
 }

@@ -312,11 +312,13 @@ TEST(Recording, TheSummaryTellsOfEveryReader) {
   s.ticks_not_recorded = 70;
   s.gaps = {{100, 70, false}};
   s.ticks_not_followed = 5;
+  s.notes_not_recorded = 3;
   const auto j = nlohmann::json::parse(write_summary({folder, {}, {}}, s, 1000, "burr"));
   EXPECT_EQ(j["ticks_lost_by_readers"], 75);
   EXPECT_EQ(j["ticks_not_recorded"], 70);
   EXPECT_EQ(j["gaps"][0]["first_tick"], 100);
   EXPECT_EQ(j["ticks_not_followed"], 5);
+  EXPECT_EQ(j["notes_not_recorded"], 3);
   fs::remove_all(folder);
 }
 

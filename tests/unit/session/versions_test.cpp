@@ -84,8 +84,7 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
   }
   const Session s = read_session(path);
   ASSERT_EQ(s.ticks.size(), 53u);
-  for (std::size_t i = 0; i < ticks.size(); ++i)
-    ASSERT_EQ(first_difference(s.tick_fields, &s.ticks[i], &ticks[i]), nullptr) << i;
+  for (std::size_t i = 0; i < ticks.size(); ++i) ASSERT_EQ(first_difference(s.tick_fields, &s.ticks[i], &ticks[i]), nullptr) << i;
   EXPECT_EQ(s.ticks[5].work_us, 3.25F) << "fields behind the added one too";
   ASSERT_EQ(s.actions.size(), 1u);
   EXPECT_EQ(s.actions[0].action.kind, 99u);
@@ -140,10 +139,11 @@ TEST(Versions, NumbersOfAnotherTypeAreConverted) {
     std::uint64_t flags, tool;
     float voxels_changed;
   };
-  const std::vector<RecordField> fields{
-      {"tick", FieldType::u64, offsetof(Wide, tick), "", ""},       {"x_mm", FieldType::f64, offsetof(Wide, x_mm), "", "", FieldRole::input},
-      {"flags", FieldType::u64, offsetof(Wide, flags), "", ""},     {"tool", FieldType::u64, offsetof(Wide, tool), "", "", FieldRole::input},
-      {"voxels_changed", FieldType::f32, offsetof(Wide, voxels_changed), "", ""}};
+  const std::vector<RecordField> fields{{"tick", FieldType::u64, offsetof(Wide, tick), "", ""},
+                                        {"x_mm", FieldType::f64, offsetof(Wide, x_mm), "", "", FieldRole::input},
+                                        {"flags", FieldType::u64, offsetof(Wide, flags), "", ""},
+                                        {"tool", FieldType::u64, offsetof(Wide, tool), "", "", FieldRole::input},
+                                        {"voxels_changed", FieldType::f32, offsetof(Wide, voxels_changed), "", ""}};
   {
     test::OtherWriter w(path, header("wide"), fields);
     w.records<Wide>(tick_table().part, fields, std::vector<Wide>{{0, 1.5, 7, 3, 2}, {1, -2.25, 0x80000001U, 400, -1}});
@@ -203,17 +203,26 @@ TEST(Versions, OtherFormatsAreRefusedWithAdvice) {
   std::ofstream(path, std::ios::binary) << "OSF1 and so on, as it was written before the records were described";
   EXPECT_NE(refusal(path).find("format 1"), std::string::npos);
   EXPECT_NE(refusal(path).find("use the version it was recorded with"), std::string::npos);
-  { test::OtherWriter w(path, header("osteotome 9"), test::tick_fields(), [](ordered_json& j) { j["osteotome_session"] = 3; }); }
+  {
+    test::OtherWriter w(path, header("osteotome 9"), test::tick_fields(), [](ordered_json& j) { j["osteotome_session"] = 3; });
+  }
   EXPECT_NE(refusal(path).find("format 3, recorded by osteotome 9"), std::string::npos) << refusal(path);
-  { test::OtherWriter w(path, header("odd"), test::tick_fields(), [](ordered_json& j) { j["records"]["tick"]["fields"][3]["type"] = "i128"; }); }
+  {
+    test::OtherWriter w(path, header("odd"), test::tick_fields(),
+                        [](ordered_json& j) { j["records"]["tick"]["fields"][3]["type"] = "i128"; });
+  }
   EXPECT_NE(refusal(path).find("'i128'"), std::string::npos) << refusal(path);
   { test::OtherWriter w(path, header("odd"), test::without("tick")); }
   EXPECT_NE(refusal(path).find("lacks 'tick'"), std::string::npos) << refusal(path);
   for (const char* const key : {"records", "haptics", "kernels", "burrs", "actions"}) {
-    { test::OtherWriter w(path, header("odd"), test::tick_fields(), [&](ordered_json& j) { j.erase(key); }); }
+    {
+      test::OtherWriter w(path, header("odd"), test::tick_fields(), [&](ordered_json& j) { j.erase(key); });
+    }
     EXPECT_NE(refusal(path).find("damaged"), std::string::npos) << key << refusal(path);
   }
-  { test::OtherWriter w(path, header("odd"), test::tick_fields(), [&](ordered_json& j) { j["actions"]["saw"] = "3"; }); }
+  {
+    test::OtherWriter w(path, header("odd"), test::tick_fields(), [&](ordered_json& j) { j["actions"]["saw"] = "3"; });
+  }
   EXPECT_NE(refusal(path).find("damaged header"), std::string::npos) << refusal(path);
   fs::remove(path);
 }
