@@ -78,6 +78,7 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   auto* const written =
       new (::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0)) std::atomic<std::uint64_t>(0);
+  { const osteo::SessionWriter once(folder / "once.oss", {}); }  // makes the plates that a header tells of, so that children need not
   std::mt19937 random(11);
   std::uint64_t acknowledged = 0, recovered = 0;
   int torn = 0;

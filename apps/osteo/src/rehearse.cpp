@@ -22,8 +22,8 @@
 #include "osteo/scene/session_folder.h"
 #include "osteo/session/export.h"
 #include "osteo/session/haptic_settings.h"
-#include "osteo/session/session_reader.h"
 #include "osteo/session/script_file.h"
+#include "osteo/session/session_reader.h"
 #include "osteo/view/world_view.h"
 
 namespace osteo {
@@ -268,13 +268,15 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
 }
 
 cli::CommandInfo ExportCommand::info() {
-  return {"export",
-          "a session for other programs: CSV, HDF5 or MCAP",
-          "By the ending: .csv for spreadsheets (actions and notes in files of their own, out-actions.csv and out-notes.csv), .h5 for MATLAB, "
-          "Python and R (columns under /ticks, /actions, /gaps, /notes), .mcap for Foxglove and ROS tools. One row a tick: pose, force, "
-          "torque, removal, flags, how late the machine was; notes are where the camera was, marks, choices. Of a damaged session all that is whole is written, and the exit code is 4.",
-          {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
-          "osteo export SESSION ticks.csv"};
+  return {
+      "export",
+      "a session for other programs: CSV, HDF5 or MCAP",
+      "By the ending: .csv for spreadsheets (actions and notes in files of their own, out-actions.csv and out-notes.csv), .h5 for MATLAB, "
+      "Python and R (columns under /ticks, /actions, /gaps, /notes), .mcap for Foxglove and ROS tools. One row a tick: pose, force, "
+      "torque, removal, flags, how late the machine was; notes are where the camera was, marks, choices. Of a damaged session all that is "
+      "whole is written, and the exit code is 4.",
+      {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
+      "osteo export SESSION ticks.csv"};
 }
 
 int ExportCommand::run(const Params&, cli::Invocation& io) {

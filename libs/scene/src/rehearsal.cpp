@@ -309,6 +309,7 @@ RehearsalSummary Rehearsal::finish() {
     s.session_bytes = recorder_->bytes();
     s.gaps = recorder_->gaps();
     s.ticks_not_recorded = recorder_->status().ticks_lost;
+    s.notes_not_recorded = recorder_->status().notes_lost;
     if (const auto failure = recorder_->status().failure; failure && !failure_) failure_ = std::make_exception_ptr(Error(*failure));
   }
   if (failure_) std::rethrow_exception(failure_);

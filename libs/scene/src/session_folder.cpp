@@ -79,7 +79,8 @@ World world_at_begin(const SessionFolder& session, const Case& the_case, const A
 namespace {
 
 // An open session and the scene at its beginning.
-std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy,
+                                         const Context& context) {
   World world = world_at_begin(session, the_case, anatomy, context);
   SessionReader recorded(session.stream());
   const std::string name = "the session '" + session.folder.string() + "'";
@@ -229,6 +230,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
     for (const RecordingGap& g : s.gaps)
       j["gaps"].push_back({{"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bone_changes_lost", g.bone_lost}});
   }
+  if (s.notes_not_recorded > 0) j["notes_not_recorded"] = s.notes_not_recorded;
   if (s.ticks_not_followed > 0) j["ticks_not_followed"] = s.ticks_not_followed;
   if (s.interrupted) j["interrupted"] = true;
   if (s.unusable_poses > 0) j["pose_unusable_s"] = static_cast<double>(s.unusable_poses) / rate_hz;

@@ -77,8 +77,7 @@ class OutFile {
 // What all formats need of a session while it goes by.
 class Rows {
  public:
-  Rows(const SessionReader& session, const Context& context)
-      : outline_(session.outline()), context_(context), parts_(session.parts()) {}
+  Rows(const SessionReader& session, const Context& context) : outline_(session.outline()), context_(context), parts_(session.parts()) {}
 
   const SessionPart* next() {
     const double ticks = std::max(1.0, static_cast<double>(outline_.tick_records));
@@ -236,8 +235,7 @@ void mcap(Rows rows, OutFile& out) {
       file.message(on_gaps, ns(g->first_tick), j.dump());
     }
     for (const Note& n : p->notes) {
-      const ordered_json j{
-          {"time_s", rows.seconds(n.tick)}, {"tick", n.tick}, {"kind", n.kind}, {"value", ordered_json::parse(n.json)}};
+      const ordered_json j{{"time_s", rows.seconds(n.tick)}, {"tick", n.tick}, {"kind", n.kind}, {"value", ordered_json::parse(n.json)}};
       file.message(on_notes, ns(n.tick), j.dump());
     }
   }
@@ -513,9 +511,8 @@ void export_session(const SessionReader& session, const fs::path& path, const Co
     // All are whole before the first takes its name.
     const auto files = export_files(path);
     streamed(files[0], [&](OutFile& ticks) {
-      streamed(files[1], [&](OutFile& actions) {
-        streamed(files[2], [&](OutFile& notes) { csv(std::move(rows), ticks, actions, notes); });
-      });
+      streamed(files[1],
+               [&](OutFile& actions) { streamed(files[2], [&](OutFile& notes) { csv(std::move(rows), ticks, actions, notes); }); });
     });
   } else if (ending == ".mcap") {
     streamed(path, [&](OutFile& out) { mcap(std::move(rows), out); });

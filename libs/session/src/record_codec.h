@@ -16,14 +16,15 @@ struct FileField {
 /// A kind of record as a file has it.
 struct FileTable {
   std::uint32_t part = 0;
-  std::size_t bytes = 0;                ///< of a record
-  bool text = false;                    ///< bytes as they are; `bytes` is 1
+  std::size_t bytes = 0;  ///< of a record
+  bool text = false;      ///< bytes as they are; `bytes` is 1
   std::vector<FileField> fields;
 };
 
 /// Appends `n` records, `bytes` apart in memory.
 void put_records(std::vector<std::byte>& out, std::span<const RecordField> fields, const void* records, std::size_t n, std::size_t bytes);
-/// The reverse: `from` holds n * table.bytes. Fields that the file lacks stay as they are in `records`; another type of number is converted.
+/// The reverse: `from` holds n * table.bytes. Fields that the file lacks stay as they are in `records`; another type of number is
+/// converted.
 void get_records(const FileTable& table, std::span<const std::byte> from, std::size_t n, void* records, std::size_t bytes);
 
 }  // namespace osteo

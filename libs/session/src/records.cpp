@@ -123,7 +123,7 @@ To converted(From value) {
     return std::in_range<To>(value) ? static_cast<To>(value) : To{};
   } else if constexpr (std::is_integral_v<To>) {
     return value >= 0 && value < 18446744073709551616.0 && std::in_range<To>(static_cast<std::uint64_t>(value)) ? static_cast<To>(value)
-                                                                                                               : To{};
+                                                                                                                : To{};
   } else {
     return static_cast<To>(value);
   }
@@ -151,9 +151,8 @@ std::size_t size_of(FieldType type) {
 }
 
 double value_of(const RecordField& field, const void* record) {
-  return with_type(field.type, [&](auto t) {
-    return static_cast<double>(load<decltype(t)>(static_cast<const std::byte*>(record) + field.offset));
-  });
+  return with_type(field.type,
+                   [&](auto t) { return static_cast<double>(load<decltype(t)>(static_cast<const std::byte*>(record) + field.offset)); });
 }
 
 const RecordField* first_difference(std::span<const RecordField* const> fields, const void* a, const void* b) {

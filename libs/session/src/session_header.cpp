@@ -180,8 +180,7 @@ std::string header_json(const SessionHeader& h) {
   j["dust"] = h.dust;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", h.kernels.contact}, {"scene", h.kernels.scene}};
   for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()}) j["records"][std::string(t->name)] = record_json(*t);
-  j["records"]["note"] = {
-      {"part", kNotesPart}, {"text", true}, {"meaning", "a line of JSON each: tick, kind, value"}};
+  j["records"]["note"] = {{"part", kNotesPart}, {"text", true}, {"meaning", "a line of JSON each: tick, kind, value"}};
   for (std::uint32_t kind = 1; name_of(static_cast<ActionKind>(kind)) != "?"; ++kind)
     j["actions"][std::to_string(kind)] = name_of(static_cast<ActionKind>(kind));
   j["burrs"] = burrs_json();
@@ -197,8 +196,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.program_version = j.at("program");
   if (j["osteotome_session"] != kSessionFormat) {
     throw Error(ExitCode::corrupt,
-                name + " is a session of format " + j["osteotome_session"].dump() + ", recorded by " + h.program_version + "; this version reads format " +
-                    std::to_string(kSessionFormat),
+                name + " is a session of format " + j["osteotome_session"].dump() + ", recorded by " + h.program_version +
+                    "; this version reads format " + std::to_string(kSessionFormat),
                 "use the version it was recorded with, which can also export it");
   }
   h.bone_hash = j.at("bone_hash");
@@ -208,7 +207,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   if (!(h.rate_hz > 0) || h.hands < 1 || h.hands > 64) throw Error(ExitCode::corrupt, name + " tells of no rate, or of no hands");
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
-  if (h.kernels != Kernels{}) say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
+  if (h.kernels != Kernels{})
+    say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
   if (h.hands != 1) say_not_replayable(o, "it has " + std::to_string(h.hands) + " hands");
   for (const auto& [kind, record] : j.at("records").items()) tables.push_back(table_of(kind, record, name, o));
   const auto has = [&](std::uint32_t part) {

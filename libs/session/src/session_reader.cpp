@@ -191,8 +191,12 @@ void SessionReader::File::take(std::uint64_t at, const FrameHead& head, std::spa
       break;
     case kEndFrame: {
       const auto j = ordered_json::parse(text_of(payload));
-      outline.end = SessionEnd{j.at("ticks"),       j.at("bone_hash"), j.at("surface_hash"),
-                               j.at("removed_mm3"), j.at("dust_hash"), j.at("ticks_lost"),
+      outline.end = SessionEnd{j.at("ticks"),
+                               j.at("bone_hash"),
+                               j.at("surface_hash"),
+                               j.at("removed_mm3"),
+                               j.at("dust_hash"),
+                               j.at("ticks_lost"),
                                j.value("notes_lost", std::uint64_t{0})};
       arrive(outline.end->ticks);
       return;
@@ -211,9 +215,10 @@ void SessionReader::File::look_through() {
     std::uint32_t magic = 0;
     static_cast<void>(bytes.read(0, &magic, sizeof magic));
     if (magic == kOldMagic)
-      throw Error(ExitCode::corrupt,
-                  name + " is a session of format 1, which this version does not read (it reads format " + std::to_string(kSessionFormat) + ")",
-                  "use the version it was recorded with, which can also export it");
+      throw Error(
+          ExitCode::corrupt,
+          name + " is a session of format 1, which this version does not read (it reads format " + std::to_string(kSessionFormat) + ")",
+          "use the version it was recorded with, which can also export it");
     throw Error(ExitCode::corrupt,
                 name + (magic == kMagic ? " is damaged at byte 0, in its header, or was cut before that ended" : " is not a session file"));
   }

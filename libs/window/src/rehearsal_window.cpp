@@ -24,8 +24,10 @@
 #include <cmath>
 #include <cstdio>
 #include <new>
+#include <numbers>
 #include <optional>
 
+#include "camera_notes.h"
 #include "cuts_panel.h"
 #include "gamepad.h"
 #include "help_panel.h"
@@ -477,6 +479,16 @@ class RehearsalWindow {
     place_tool(tick);
     tools_->show(tick);
     wash(now, tick);
+    note_camera(now);
+  }
+
+  void note_camera(Rehearsal& rehearsal) {
+    vtkCamera* const camera = renderer_->GetActiveCamera();
+    const auto vec = [](const double* v) { return Vec3{v[0], v[1], v[2]}; };
+    CameraView view{vec(camera->GetPosition()), vec(camera->GetFocalPoint()), vec(camera->GetViewUp()), camera->GetViewAngle(), 0};
+    view.pixels_per_mm = height_ / (2 * camera->GetDistance() * std::tan(view.view_angle_deg * std::numbers::pi / 360));
+    const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    if (const auto note = camera_notes_.next(view, now_s, &rehearsal)) rehearsal.note("camera", *note);
   }
 
   void end_picture() {
@@ -685,6 +697,10 @@ class RehearsalWindow {
       case Command::taper:
         set_shape(BurrShape::taper);
         break;
+      case Command::mark:
+        rehearsal.note("mark", "{}");
+        say("marked");
+        break;
       case Command::screenshot:
         screenshot_wanted_ = true;
         break;
@@ -872,6 +888,7 @@ class RehearsalWindow {
   int gl_errors_ = 0;
   std::uint64_t pictures_ = 0;
   bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false, in_hand_ = true;
+  CameraNotes camera_notes_;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
   std::string message_;

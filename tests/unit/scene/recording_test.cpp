@@ -156,7 +156,7 @@ TEST(Recording, AGapIsReplayedUpToItAndBoneBehindItIsKnown) {
   header.program_version = "test";
   header.bone_hash = world.hash();
   header.haptics = setup;
-  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<test::StallingSink>(disk, file), header, 32 << 10);
+  auto recorder = std::make_unique<Recorder>(reader, std::make_unique<test::StallingSink>(disk, file), header, 8 << 10);
   Operation operation(std::move(world), setup, {}, device, stream, 1000);
   recorder->start();
   bool closed = false;
@@ -324,11 +324,13 @@ TEST(Recording, TheSummaryTellsOfEveryReader) {
   s.ticks_not_recorded = 70;
   s.gaps = {{100, 70, false}};
   s.ticks_not_followed = 5;
+  s.notes_not_recorded = 3;
   const auto j = nlohmann::json::parse(write_summary({folder, {}, {}}, s, 1000, "burr"));
   EXPECT_EQ(j["ticks_lost_by_readers"], 75);
   EXPECT_EQ(j["ticks_not_recorded"], 70);
   EXPECT_EQ(j["gaps"][0]["first_tick"], 100);
   EXPECT_EQ(j["ticks_not_followed"], 5);
+  EXPECT_EQ(j["notes_not_recorded"], 3);
   fs::remove_all(folder);
 }
 

@@ -321,6 +321,170 @@ TEST(Recorder, EndsOnce) {
   fs::remove(path);
 }
 
+// From several threads, while ticks are recorded.
+TEST(Recorder, NotesKeepTheirOrderAndWhatFindsNoRoomIsCounted) {
+  const auto path = fresh("notes");
+  Disk disk;
+  StreamReader reader(Recorder::kTickCapacity, 1 << 21);
+  Servo servo(reader);
+  {
+    Recorder recorder(reader, std::make_unique<StallingSink>(disk, path), header());
+    recorder.start();
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t) {
+      threads.emplace_back([&recorder, t] {
+        for (int n = 0; n < 500; ++n) recorder.note({static_cast<std::uint64_t>(n), "thread " + std::to_string(t), std::to_string(n)});
+      });
+    }
+    servo.run(3000, 5);
+    for (auto& t : threads) t.join();
+    recorder.note({1, "odd", "no \"JSON\" \xff\n at all"});
+    recorder.note({2, "long", std::string(Recorder::kLongestNote + 1, '1')});
+    servo.wait_until_taken();
+    EXPECT_EQ(recorder.status().notes_lost, 1u);
+    recorder.finish({servo.next, "", "", 0, {}, 0, 0});
+    recorder.note({3, "late", "1"});
+    EXPECT_EQ(recorder.status().notes_lost, 2u);
+  }
+  const Session s = read_session(path);
+  ASSERT_EQ(s.notes.size(), 1501u);
+  std::map<std::string, int> next;
+  for (const Note& n : s.notes) {
+    if (n.kind == "odd") {
+      EXPECT_EQ(n.json.substr(0, 15), "\"no \\\"JSON\\\" \xef\xbf") << n.json;
+      continue;
+    }
+    EXPECT_EQ(n.json, std::to_string(next[n.kind]++)) << n.kind;
+  }
+  EXPECT_EQ(next["thread 0"], 500);
+  EXPECT_EQ(s.ticks.size(), 3000u);
+  ASSERT_TRUE(s.end);
+  EXPECT_EQ(s.end->notes_lost, 1u);
+  fs::remove(path);
+}
+
+// While nothing can be written notes wait, as many as there is room for.
+TEST(Recorder, NotesWaitWhileTheDiskStalls) {
+  const auto path = fresh("patient");
+  StreamReader reader(Recorder::kTickCapacity, 1 << 21);
+  Servo servo(reader);
+  {
+    Recorder recorder(reader, path, header());
+    for (std::size_t n = 0; n < Recorder::kMostNotes + 7; ++n) recorder.note({n, "n", "{}"});
+    EXPECT_EQ(recorder.status().notes_lost, 7u);
+    servo.run(250, 1);
+    recorder.drain();
+    recorder.note({250, "n", "{}"});
+    EXPECT_EQ(recorder.status().notes_lost, 7u) << "there is room again";
+    recorder.finish({servo.next, "", "", 0, {}, 0, 0});
+  }
+  EXPECT_EQ(read_session(path).notes.size(), Recorder::kMostNotes + 1);
+  fs::remove(path);
+}
+
+// What a checkpoint holds is what came before it, the shortest way; and each action that looks at bone finds the bone it found.
+TEST(SessionFile, CheckpointsHoldTheSameSceneInLess) {
+  const auto path = fresh("checkpoints");
+  SessionHeader h = header();
+  h.rate_hz = 10;  // a checkpoint each 600 ticks
+  std::mt19937 random(4);
+  {
+    SessionWriter w(path, h);
+    for (std::uint64_t t = 0; t < 2000; ++t) {
+      SessionBatch b;
+      b.ticks.resize(1);
+      b.ticks[0].tick = t;
+      for (int c = 0; c < 5; ++c) b.changes.push_back({static_cast<VoxelKey>(random() % 50), static_cast<float>(random() % 100)});
+      if (t % 7 == 3) b.actions.push_back(SceneAction::plain(ActionKind::soft_push));
+      if (t % 100 == 50) b.actions.push_back(SceneAction::move(static_cast<std::uint32_t>(t), {}));
+      if (t % 150 == 70) b.actions.insert(b.actions.begin(), SceneAction::split(static_cast<double>(t)));
+      for (SceneAction& a : b.actions) a.tick = t;
+      w.append(b);
+    }
+    w.finish({2000, "", "", 0, {}, 0, 0});
+  }
+  const SessionReader reader(path);
+  // Bone, and what each split found.
+  struct Scene {
+    std::map<VoxelKey, float> bone;
+    std::map<double, std::map<VoxelKey, float>> found;
+    std::vector<std::uint32_t> moves;
+    std::size_t changes = 0;
+    void take(const SessionPart& p) {
+      for (const SceneAction& a : p.actions) {
+        if (a.is(ActionKind::split)) found[a.values[0]] = bone;
+        if (a.is(ActionKind::move)) moves.push_back(a.body);
+        EXPECT_FALSE(p.checkpoint);
+      }
+      for (const VoxelChange& c : p.changes) bone[c.voxel] = c.density;
+      changes += p.changes.size();
+    }
+  };
+  Scene all, shorter;
+  auto parts = reader.parts(), checkpoints = reader.checkpoints();
+  std::vector<std::uint64_t> marks;
+  while (const SessionPart* const p = parts.next()) {
+    all.take(*p);
+    if (!p->checkpoint) continue;
+    marks.push_back(*p->checkpoint);
+    for (const SessionPart* q = checkpoints.next(); q != nullptr; q = checkpoints.next()) {
+      if (q->checkpoint) {
+        EXPECT_EQ(*q->checkpoint, marks.back());
+        break;
+      }
+      for (const SceneAction& a : q->actions) EXPECT_FALSE(a.is(ActionKind::soft_push)) << "nothing of the scene follows from it";
+      shorter.take(*q);
+    }
+    EXPECT_EQ(shorter.bone, all.bone);
+    EXPECT_EQ(shorter.found, all.found);
+    EXPECT_EQ(shorter.moves, all.moves);
+  }
+  EXPECT_EQ(marks, (std::vector<std::uint64_t>{600, 1200, 1800, 2000}));
+  EXPECT_LT(shorter.changes * 8, all.changes);
+  // Any time: the same as everything up to there.
+  for (const std::uint64_t tick : {0, 1, 599, 600, 601, 1199, 1250, 1999, 2000, 5000}) {
+    std::uint64_t reached = 0;
+    Scene seen, full;
+    auto short_way = reader.scene_at(tick, reached);
+    while (const SessionPart* const p = short_way.next()) seen.take(*p);
+    EXPECT_EQ(reached, std::min<std::uint64_t>(tick, 2000));
+    auto again = reader.parts();
+    std::uint64_t next = 0;
+    while (const SessionPart* const p = again.next()) {
+      if (!p->ticks.empty()) next = p->ticks.back().tick + 1;
+      const bool later = !p->actions.empty() && p->actions.front().tick >= reached;
+      if (!later && next <= reached) full.take(*p);
+    }
+    EXPECT_EQ(seen.bone, full.bone) << tick;
+    EXPECT_EQ(seen.found, full.found) << tick;
+    EXPECT_EQ(seen.moves, full.moves) << tick;
+  }
+  // Killed in the middle of a checkpoint, or right behind it: it is not used, and nothing is missing.
+  const std::string whole = read_text(path);
+  const auto cut = fresh("cut-checkpoint");
+  std::size_t cuts = 0;
+  for (std::size_t at = 0; at < whole.size();) {
+    std::uint32_t head[8];
+    std::memcpy(head, whole.data() + at, sizeof head);
+    at += sizeof head + head[2];
+    if (head[1] != 4) continue;
+    ++cuts;
+    std::ofstream(cut, std::ios::binary) << whole.substr(0, at);
+    const SessionReader shorter_file(cut);
+    Scene seen, full;
+    std::uint64_t reached = 0;
+    auto short_way = shorter_file.scene_at(~std::uint64_t{0}, reached);
+    while (const SessionPart* const p = short_way.next()) seen.take(*p);
+    auto again = shorter_file.parts();
+    while (const SessionPart* const p = again.next()) full.take(*p);
+    EXPECT_EQ(seen.bone, full.bone);
+    EXPECT_EQ(seen.moves, full.moves);
+  }
+  EXPECT_GT(cuts, 10u);
+  fs::remove(cut);
+  fs::remove(path);
+}
+
 // --- files that are damaged ---
 
 struct Parts {

@@ -48,6 +48,7 @@ struct RehearsalSummary {
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
+  std::uint64_t notes_not_recorded = 0;
   std::uint64_t ticks_not_followed =
       0;                     ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
   bool interrupted = false;  ///< run_to_end() was asked to stop

@@ -31,8 +31,8 @@ struct SessionOutline {
   std::vector<const RecordField*> tick_fields;        ///< those of ours that the file has
   std::map<std::uint32_t, std::string> action_names;  ///< as the file has them
   std::vector<std::string> tools;                     ///< names of its burrs
-  std::string not_replayable;      ///< why this build's servo cannot repeat it; empty: it can
-  std::vector<std::string> newer;  ///< what it holds that this build does not know and leaves out, each in a line
+  std::string not_replayable;                         ///< why this build's servo cannot repeat it; empty: it can
+  std::vector<std::string> newer;                     ///< what it holds that this build does not know and leaves out, each in a line
 
   [[nodiscard]] bool damaged() const;
   /// The gap behind which changes and actions do not give the bone any more; null: they give it to the end. (Bone that the recorder lost on
@@ -91,9 +91,9 @@ class SessionReader {
   [[nodiscard]] Parts parts() const;
   /// The contents of the checkpoints: actions and changes that give the same scene at each.
   [[nodiscard]] Parts checkpoints() const;
-  /// The fewest actions and changes that give the scene in which `tick` begins, and nothing else. They give it at `reached`: where the frame
-  /// ends that holds the tick before, so at most a tenth of a second later. Error(corrupt) where that scene is not known, since something is
-  /// missing before.
+  /// The fewest actions and changes that give the scene in which `tick` begins, and nothing else. They give it at `reached`: where the
+  /// frame ends that holds the tick before, so at most a tenth of a second later. Error(corrupt) where that scene is not known, since
+  /// something is missing before.
   [[nodiscard]] Parts scene_at(std::uint64_t tick, std::uint64_t& reached) const;
 
  private:
