@@ -42,8 +42,8 @@ void latency(const BrickGrid& bone, const Context& context) {
       "## From bone removed to triangles ready: by the clock, 1 kHz, head at 0.5 mm, the follower's thread beside the servo's\n\n"
       "| burr | followed | p50 ms | p99 ms | p99.9 ms | worst ms | ticks that removed bone |\n|---|---|---|---|---|---|---|\n");
   for (const int diameter : {4, 6}) {
-    for (const FollowerParts parts :
-         {FollowerParts{true, false, false}, FollowerParts{true, true, false}, FollowerParts{true, true, true}}) {
+    for (const ReaderList parts :
+         {ReaderList{true, false, false}, ReaderList{true, true, false}, ReaderList{true, true, true}}) {
       const int tool = burr_index(BurrKind::cutting, diameter);
       ScriptedDevice device(make_default_script(World(BrickGrid(bone)), true, tool, 12), 1000);
       HapticSetup setup;
@@ -51,7 +51,10 @@ void latency(const BrickGrid& bone, const Context& context) {
       Stream stream;
       StreamReader& reader = stream.add_reader();
       Operation operation(World(BrickGrid(bone)), setup, {}, device, stream, 1000);
-      Follower follower(operation.world(), parts, 1000, context);
+      ReaderHub hub(reader, operation.world());
+      SceneReaders readers(operation.world(), parts, 1000, context);
+      readers.add_to(hub);
+      hub.add(operation.strokes(), false);
       std::vector<std::atomic<std::int64_t>> published(20000);
       FixedRateLoop loop(1000, [&](std::int64_t late) {
         const std::uint64_t t = operation.ticks();
@@ -65,7 +68,7 @@ void latency(const BrickGrid& bone, const Context& context) {
       StreamReader& watch = stream.add_reader(1 << 15, 1 << 22);
       loop.start();
       while (loop.running() || seen < operation.ticks()) {
-        const std::size_t n = follower.drain(reader);
+        const std::size_t n = hub.drain();
         const std::int64_t now = monotonic_ns();
         for (std::uint64_t t = seen; t < seen + n; ++t) {
           TickRecord r;
@@ -87,7 +90,7 @@ void latency(const BrickGrid& bone, const Context& context) {
 void pieces(const BrickGrid& bone, const Context& context) {
   std::printf("## A head sawn and taken apart: stages of the live split\n\n| step | ms |\n|---|---|\n");
   World world{BrickGrid(bone)};
-  Follower follower(world, {true, true, false}, 1000, context);
+  SceneReaders readers(world, {true, true, false}, 1000, context);
   HapticSetup setup;
   setup.device = SpringHand::traits();
   const HapticRenderer renderer(setup, {}, 1e-3);
@@ -95,12 +98,13 @@ void pieces(const BrickGrid& bone, const Context& context) {
   const SawCut cut{bone.frame().centre_mm(), {0, 0.3, 1}, {1, 0, 0}, 1};
   for (const SceneAction& a : {SceneAction::saw(cut), SceneAction::split(50), SceneAction::plain(ActionKind::undo)}) {
     std::int64_t t = monotonic_ns();
-    const World::Effect e = world.act(a, [&](std::uint32_t id) { return follower.components(id); });
+    const World::Effect e = world.act(a, [&](std::uint32_t id) { return readers.pieces->components(id); });
     const std::string name(name_of(static_cast<ActionKind>(a.kind)));
     std::printf("| %s: bone%s | %.1f |\n", name.c_str(),
                 a.is(ActionKind::split) ? (" of " + std::to_string(world.bodies().size()) + " bodies").c_str() : "", ms_since(t));
     t = monotonic_ns();
-    follower.follow(world, e);
+    readers.surface->scene_changed(world, e);
+    readers.pieces->scene_changed(world, e);
     std::printf("| %s: surfaces and labels | %.1f |\n", name.c_str(), ms_since(t));
     t = monotonic_ns();
     HapticScene next = HapticScene::of(world, renderer.setup(), &scene);

@@ -5,8 +5,11 @@ usage: check_sessions.py BIN_DIR FIXTURES WORK_DIR      exits 77 (skipped) when 
 """
 import csv, json, pathlib, shutil, struct, subprocess, sys, zlib
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "docs"))
+
 try:
     import h5py, numpy as np
+    import read_session
     from mcap.reader import NonSeekingReader, SeekingReader
 except ImportError as e:
     print(f"skipped: {e}; ./test installs the readers when PyPI can be reached")
@@ -34,22 +37,25 @@ strokes["actions"] = [
 (work / "s.json").write_text(json.dumps(strokes))
 osteo("rehearse", "case", "--headless", "--fast", "--dust", "--script", "s.json", "-o", "session")
 
-# The stream itself, by its documented layout: docs/session-format.md.
-raw, ticks, actions, at = (work / "session/stream.oss").read_bytes(), [], [], 0
-while at < len(raw):
-    magic, kind, size, crc = struct.unpack_from("<4sIII", raw, at)
-    assert magic == b"OSF1"
-    if kind == 2:
-        for t in range(at + 16, at + 16 + size, 120):
-            tick, x, y, z = struct.unpack_from("<Q3f", raw, t)
-            force = struct.unpack_from("<3f", raw, t + 36)
-            removed, changed, immersed = struct.unpack_from("<fII", raw, t + 80)
-            ticks.append((tick, x, y, z, raw[t + 35], *force, removed, changed, immersed))
-    if kind == 5:
-        actions.append(struct.unpack_from("<Q4I12d", raw, at + 16))
-    at += 16 + size
-truth = np.array(ticks)
+# The stream itself, by the reader in the documentation.
+stream = work / "session/stream.oss"
+session = read_session.read(stream)
 names = ["tick", "x_mm", "y_mm", "z_mm", "buttons", "force_x_n", "force_y_n", "force_z_n", "removed_mm3", "voxels_changed", "immersed"]
+truth = np.array([session["tick"][n] for n in names], float).T
+a = session["action"]
+actions = [tuple(a[f["name"]][i] for f in session["header"]["records"]["action"]["fields"]) for i in range(len(a["tick"]))]
+summary = json.loads((work / "session/summary.json").read_text())
+assert session["end"]["bone_hash"] == summary["bone_hash"] and not session["gaps"]
+assert abs(session["tick"]["removed_mm3"].astype(float).sum() - summary["removed_mm3"]) < 1e-6 * summary["removed_mm3"]
+assert session["header"]["actions"]["3"] == "saw" and len(session["header"]["burrs"]) > 10 and len(session["header"]["plates"]) > 2
+assert len(session["change"]["voxel"]) > 100 and 0 <= session["change"]["density"].min() < session["change"]["density"].max() <= 1
+# A flipped bit takes its own frame with it and nothing else.
+damaged = bytearray(stream.read_bytes())
+damaged[damaged.index(b"OSF2", len(damaged) // 2) + 40] ^= 4
+(work / "damaged.oss").write_bytes(damaged)
+kept = read_session.read(work / "damaged.oss")
+assert 1800 <= len(kept["tick"]["tick"]) < 2000 and kept["end"], len(kept["tick"]["tick"])
+print(f"ok  read_session.py: {len(session['tick']['tick'])} ticks, {len(session['change']['voxel'])} changes")
 assert len(truth) == 2000 and truth[:, 8].sum() > 0.1 and truth[:, 10].sum() > 0, "the session should drill"
 assert len(actions) == 4, actions
 kinds = {10: "suction", 3: "saw", 5: "move", 12: "undo"}
@@ -71,7 +77,7 @@ def same_actions(what, rows):
 for ending in ("csv", "h5", "mcap"):
     osteo("export", "session", f"out.{ending}")
 left = sorted(p.name for p in work.iterdir() if p.name.startswith((".", "out")))
-assert left == ["out-actions.csv", "out.csv", "out.h5", "out.mcap"], left
+assert left == ["out-actions.csv", "out-notes.csv", "out.csv", "out.h5", "out.mcap"], left
 with open(work / "out.csv") as f:
     rows = list(csv.DictReader(f))
 same("CSV", {n: np.float32([r[n] for r in rows]) for n in names})
@@ -101,7 +107,7 @@ with open(work / "out.mcap", "rb") as f:
     indexed = [m.data for _, c, m in reader.iter_messages(topics=["/ticks"])]
     later = [m.log_time for _, _, m in reader.iter_messages(start_time=1_500_000_000)]
 assert summary.statistics.message_count == len(messages) == 2004 and summary.statistics.chunk_count == len(summary.chunk_indexes) > 1
-assert {c.topic for c in summary.channels.values()} == {"/ticks", "/actions"} and min(later) == 1_500_000_000 and len(later) == 501
+assert {c.topic for c in summary.channels.values()} == {"/ticks", "/actions", "/gaps", "/notes"} and min(later) == 1_500_000_000 and len(later) == 501
 ticks_m = [m for _, c, m in messages if c.topic == "/ticks"]
 assert indexed == [m.data for m in ticks_m]
 records = [json.loads(d) for d in indexed]

@@ -11,19 +11,19 @@ flips = int(sys.argv[5]) if len(sys.argv) > 5 else 40
 shutil.rmtree(work, ignore_errors=True)
 shutil.copytree(session, work)
 raw = (session / "stream.oss").read_bytes()
-kinds = {1: "header", 2: "ticks", 3: "changes", 4: "end", 5: "actions", 6: "gap"}
+kinds = {1: "header", 2: "records", 3: "gap", 4: "checkpoint", 5: "end"}
 frames, at = [], 0
 while at < len(raw):
-    _, kind, size, _ = struct.unpack_from("<4sIII", raw, at)
+    _, kind, size, _, _, _ = struct.unpack_from("<4sIIIQQ", raw, at)
     frames.append((at, kinds[kind], size))
-    at += 16 + size
+    at += 32 + size
 
 random.seed(7)
 places = []  # (part, first byte, bytes)
 for f, (at, kind, size) in enumerate(frames):
     if kind not in ("header", "end"):
-        places += [("magic", at, 4), ("type", at + 4, 4), ("length", at + 8, 4), ("checksum", at + 12, 4)]
-    places.append((f"payload of {kind}", at + 16, size) if kind not in ("header", "end") else (kind, at, 16 + size))
+        places += [("magic", at, 4), ("type", at + 4, 4), ("length", at + 8, 4), ("checksum", at + 12, 4), ("tick numbers", at + 16, 16)]
+    places.append((f"payload of {kind}", at + 32, size) if kind not in ("header", "end") else (kind, at, 32 + size))
 parts = collections.defaultdict(list)
 for part, at, size in places:
     if size > 0:

@@ -15,7 +15,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/session/recorder.h"
-#include "osteo/session/session_file.h"
+#include "osteo/session/session_reader.h"
 
 namespace {
 
@@ -43,13 +43,14 @@ std::vector<osteo::TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
       while (reader.ticks.room() < 1 || !reader.changes.push(changes)) std::this_thread::yield();
       reader.ticks.push(t);
     }
-    // The system has them once they are taken and nothing waits.
     tick += n;
-    for (osteo::Recorder::Status s; s.ticks < tick || s.waiting_bytes > 0;) {
-      s = recorder.status();
+    // The system has what is in a frame once nothing waits; the last tenth of a second is not in one yet.
+    osteo::Recorder::Status status;
+    do {
+      status = recorder.status();
       std::this_thread::yield();
-    }
-    written->store(tick, std::memory_order_release);
+    } while (status.waiting_bytes > 0 || status.ticks + 100 < tick);
+    written->store(status.ticks, std::memory_order_release);
   }
 }
 
@@ -62,7 +63,7 @@ std::vector<osteo::TickRecord> some_ticks(std::uint64_t first, std::size_t n) {
     const std::size_t n = 1 + random() % 40;
     std::vector<osteo::VoxelChange> changes(random() % 200);
     for (auto& c : changes) c = {static_cast<osteo::VoxelKey>(random() % 100000), 0.5F};
-    writer.append(some_ticks(tick, n), changes);
+    writer.append({{}, some_ticks(tick, n), changes, {}});
     tick += n;
     written->store(tick, std::memory_order_release);
   }
@@ -77,6 +78,7 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(folder);
   auto* const written =
       new (::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0)) std::atomic<std::uint64_t>(0);
+  { const osteo::SessionWriter once(folder / "once.oss", {}); }  // makes the plates that a header tells of, so that children need not
   std::mt19937 random(11);
   std::uint64_t acknowledged = 0, recovered = 0;
   int torn = 0;

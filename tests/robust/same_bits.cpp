@@ -136,7 +136,8 @@ void servo(ContactMethod method, int tool) {
     ++ticks;
   }
   while (reader.changes.pop(std::span(&change, 1)) > 0) {
-    sum.add(change);
+    sum.add(change.voxel);
+    sum.add(change.density);
     ++changes;
   }
   sum.print("servo-" + std::string(EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)]) + "-tool-" + std::to_string(tool) +

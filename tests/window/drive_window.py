@@ -165,6 +165,7 @@ def keys():
         for name in ("F1", "h"):
             key(name, "help", lambda s: s["help"])
             key(name, "help away", lambda s: not s["help"])
+        key("m", "mark", lambda s: s["message"] == "marked")
         key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.
         key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
@@ -231,6 +232,9 @@ def keys():
     assert closed(second)[0]["sawn_mm3"] > 10
     assert closed(third)[1]["actions"] == 0
     assert (pathlib.Path(second) / "session.json").read_text().count("resumed_from") == 1
+    osteo("export", "first", "first.csv")
+    notes = pathlib.Path("first-notes.csv").read_text()
+    assert '"mark"' in notes and "eye_mm" in notes, notes
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}

@@ -23,6 +23,7 @@
 #include "osteo/session/export.h"
 #include "osteo/session/haptic_settings.h"
 #include "osteo/session/script_file.h"
+#include "osteo/session/session_reader.h"
 #include "osteo/view/world_view.h"
 
 namespace osteo {
@@ -130,7 +131,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
   Rehearsal rehearsal(std::move(world), std::move(device), options, io.context);
   const auto draw = [&](const char* name) {
-    rehearsal.look([&](const World& w, Follower& f) {
+    rehearsal.look([&](const World& w, SceneReaders& f) {
       save_picture(draw_world(w, f, rehearsal.structures(), view, rehearsal.soft()), folder / name);
     });
   };
@@ -182,7 +183,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   }
   TriMesh after;
   draw("after.png");
-  rehearsal.look([&](const World& w, Follower&) { after = surface_of(w, io.context); });
+  rehearsal.look([&](const World& w, SceneReaders&) { after = surface_of(w, io.context); });
   save_surface(after, folder / "surface.ply");
   io.end_progress();
   if (!io.common.quiet) {
@@ -219,9 +220,10 @@ cli::CommandInfo ReplayCommand::info() {
 
 int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
-  const Session session = read_session(folder.stream(), Damage::keep);
+  const SessionReader session(folder.stream(), Damage::keep);
+  const SessionOutline& outline = session.outline();
   const Case the_case = load_case(folder.case_folder);
-  HapticSetup setup = session.header.haptics;
+  HapticSetup setup = outline.header.haptics;
   const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
   const ReplayResult r = replay(session, world_at_begin(folder, the_case, anatomy, io.context), anatomy, io.context);
   if (!p.surface_out.empty()) {
@@ -241,15 +243,16 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
                  {"bone_hash", r.bone_hash}, {"surface_hash", r.surface_hash},
                  {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3},
                  {"seconds", r.seconds}};
-  if (anatomy.structures) j["structures"] = ordered_json::parse(structures_json(r.structures, *anatomy.structures, session.header.rate_hz));
+  if (anatomy.structures) j["structures"] = ordered_json::parse(structures_json(r.structures, *anatomy.structures, outline.header.rate_hz));
   if (!r.difference.empty()) j["difference"] = r.difference;
+  if (r.difference_since_s) j["same_until_s"] = *r.difference_since_s;
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
-  const bool whole = session.gaps.empty();
+  const bool whole = outline.gaps.empty();
   if (!whole) {
     io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "
-           << (session.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone")
+           << (outline.bone_known_until() ? "bone behind the first loss is not known" : "behind them the recorded changes give the bone")
            << '\n';
   }
   if (!io.common.quiet) {
@@ -259,24 +262,27 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
            << (r.complete ? "" : " (the session was cut short: its end is not recorded)") << '\n'
            << "bone " << r.bone_hash << "  surface " << r.surface_hash << '\n';
   }
-  if (session.damaged()) return static_cast<int>(ExitCode::corrupt);
+  if (outline.damaged()) return static_cast<int>(ExitCode::corrupt);
   if (!r.identical) return static_cast<int>(ExitCode::failed);
   return whole ? 0 : static_cast<int>(ExitCode::partial);
 }
 
 cli::CommandInfo ExportCommand::info() {
-  return {"export",
-          "a session for other programs: CSV, HDF5 or MCAP",
-          "By the ending: .csv for spreadsheets (actions in a second file, out-actions.csv), .h5 for MATLAB, Python and R (columns under "
-          "/ticks, /actions, /gaps), .mcap for Foxglove and ROS tools. One row a tick: pose, force, torque, removal, flags, how late the "
-          "machine was. Of a damaged session all that is whole is written, and the exit code is 4.",
-          {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
-          "osteo export SESSION ticks.csv"};
+  return {
+      "export",
+      "a session for other programs: CSV, HDF5 or MCAP",
+      "By the ending: .csv for spreadsheets (actions and notes in files of their own, out-actions.csv and out-notes.csv), .h5 for MATLAB, "
+      "Python and R (columns under /ticks, /actions, /gaps, /notes), .mcap for Foxglove and ROS tools. One row a tick: pose, force, "
+      "torque, removal, flags, how late the machine was; notes are where the camera was, marks, choices. Of a damaged session all that is "
+      "whole is written, and the exit code is 4.",
+      {{"session", "a session folder"}, {"output", "file that ends in .csv, .h5 or .mcap"}},
+      "osteo export SESSION ticks.csv"};
 }
 
 int ExportCommand::run(const Params&, cli::Invocation& io) {
   const SessionFolder folder = open_session_folder(io.arguments[0]);
-  const Session session = read_session(folder.stream(), Damage::keep);
+  const SessionReader session(folder.stream(), Damage::keep);
+  const SessionOutline& outline = session.outline();
   const fs::path out = io.arguments[1];
   for (const fs::path& file : export_files(out)) {
     if (fs::exists(file) && !io.common.force)
@@ -284,13 +290,14 @@ int ExportCommand::run(const Params&, cli::Invocation& io) {
   }
   export_session(session, out, io.context);
   io.end_progress();
-  for (const std::string& line : losses(session)) io.err << "session: " << line << '\n';
+  for (const std::string& line : losses(outline)) io.err << "session: " << line << '\n';
+  for (const std::string& line : outline.newer) io.err << "session: of a later version, left out: " << line << '\n';
   if (!io.common.quiet) {
-    io.err << session.ticks.size() << " ticks and " << session.actions.size() << " actions written to";
+    io.err << outline.tick_records << " ticks written to";
     for (const fs::path& file : export_files(out)) io.err << ' ' << file.string();
-    io.err << (session.end ? "" : " (the session was cut short)") << '\n';
+    io.err << (outline.end ? "" : " (the session was cut short)") << '\n';
   }
-  return session.damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
+  return outline.damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
 }
 
 cli::CommandInfo PlanCommand::info() {
@@ -298,7 +305,7 @@ cli::CommandInfo PlanCommand::info() {
       "plan",
       "where a session left pieces and plates: transforms, STL, gaps between plate and bone",
       "Writes plan.json, an STL of each piece and plate where it is, and for each plate how far bone lies below its underside; a picture "
-      "too.",
+      "too. With --at-s as it was at that time.",
       {{"session", "a session folder"}},
       "osteo plan SESSION -o plan"};
 }
@@ -306,9 +313,9 @@ cli::CommandInfo PlanCommand::info() {
 int PlanCommand::run(const Params& p, cli::Invocation& io) {
   const SessionFolder session = open_session_folder(io.arguments[0], p.case_folder);
   const Case the_case = load_case(session.case_folder);
-  const World world = world_at_end(session, the_case, {}, io.context);
+  const World world = p.at_s < 0 ? world_at_end(session, the_case, {}, io.context) : world_at(session, p.at_s, the_case, {}, io.context);
   const fs::path folder = p.out.empty() ? session.folder / "plan" : fs::path(p.out);
-  Follower follower(world, {true, false, false}, 1000, io.context);
+  SceneReaders readers(world, {}, 1000, io.context);
   Vec3 lo{1e9, 1e9, 1e9}, hi = lo * -1;
   for (const auto& q : surface_of(world, io.context).points_mm) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -317,7 +324,7 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
     }
   }
   const WorldPicture view{(lo + hi) * 0.5, 0.36 * length(hi - lo), normalized({0.8, -0.6, 0.2}), 1100, 850};
-  const auto picture = draw_world(world, follower, nullptr, view);
+  const auto picture = draw_world(world, readers, nullptr, view);
   std::string text;
   write_folder_atomically(folder, {}, [&](const fs::path& whole) {
     text = write_plan(world, whole, io.context);

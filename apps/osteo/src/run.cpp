@@ -68,11 +68,48 @@ cli::CommandInfo DocsCommand::info() {
           "osteo docs docs/reference"};
 }
 
+namespace {
+
+// The table of actions, for who reads session files.
+std::string actions_page() {
+  std::string page =
+      "<!-- Made by `osteo docs`; a test fails when it is stale. -->\n\n# Actions\n\nWhat is done to a scene besides drilling, as session "
+      "files hold it. Numbers 0xffffffff mean none.\n\n| kind | name | what it does | names | values, from the first on "
+      "|\n|---|---|---|---|---|\n";
+  for (const ActionRow& row : action_table()) {
+    std::string names, values;
+    const auto add = [&](const char* field, std::string_view what) {
+      if (!what.empty()) names += (names.empty() ? "`" : "; `") + std::string(field) + "` " + std::string(what);
+    };
+    add("body", row.body);
+    add("other", row.other);
+    add("item", row.item);
+    add("hand", row.hand);
+    for (const ActionValue& v : row.values)
+      values += (values.empty() ? "" : ", ") + std::string(v.name) + (v.unit == "1" ? "" : " (" + std::string(v.unit) + ")");
+    page += "| " + std::to_string(static_cast<std::uint32_t>(row.kind)) + " | " + std::string(row.name) + " | " + std::string(row.help) +
+            " | " + names + " | " + values + " |\n";
+  }
+  page +=
+      "\n| name | changes the world | and what is touched | after a hold | ends a hold | the last of several counts | moves dust |\n"
+      "|---|---|---|---|---|---|---|\n";
+  for (const ActionRow& row : action_table()) {
+    page += "| " + std::string(row.name);
+    for (const bool is : {row.changes_world, row.changes_touch, row.reads_bone, row.ends_hold, row.last_counts, row.moves_dust})
+      page += is ? " | yes" : " | ";
+    page += " |\n";
+  }
+  return page;
+}
+
+}  // namespace
+
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
   int stale = 0;
   auto pages = cli::reference_pages(make_osteo_program());
   pages["script.schema.json"] = script_schema();
+  pages["actions.md"] = actions_page();
   for (const auto& [name, content] : pages) {
     const fs::path path = folder / name;
     if (!p.check) {

@@ -114,11 +114,84 @@ World::Done World::snapshot(ActionKind kind, std::uint32_t of) const {
   return d;
 }
 
-void World::remember(Done done) {
-  // Dragging a piece is one move, not one for each picture: only where it began is kept. So is turning a distractor's screw.
-  const bool goes_on = (done.kind == ActionKind::move || done.kind == ActionKind::open) && !done_.empty() &&
-                       done_.back().kind == done.kind && done_.back().of == done.of;
-  if (!goes_on) done_.push_back(std::move(done));
+// Dragging a piece is one step, not one for each picture. So is turning a distractor's screw.
+bool World::goes_on(const Done& before, const Done& after) {
+  return (after.kind == ActionKind::move || after.kind == ActionKind::open) && before.kind == after.kind && before.of == after.of;
+}
+
+std::size_t World::undo_steps() const {
+  std::size_t steps = 0;
+  // The stroke that goes on stands between those that were told and the others.
+  for (std::size_t d = 0; d < done_.size(); ++d)
+    steps += d > 0 && (d != told_ || stroke_.empty()) && goes_on(done_[d - 1], done_[d]) ? 0 : 1;
+  return steps + (stroke_.empty() || missed_ ? 0 : 1);
+}
+
+void World::tell(std::span<const VoxelChange> changes) {
+  for (const VoxelChange& c : changes) {
+    const auto [known, is_new] = in_stroke_.try_emplace(c.voxel, static_cast<std::uint32_t>(stroke_.size()));
+    if (is_new) {
+      stroke_.push_back({c.voxel, c.before, c.density});
+    } else {
+      stroke_[known->second].after = c.density;
+    }
+  }
+}
+
+void World::end_stroke() {
+  if (stroke_.empty()) return;
+  in_stroke_.clear();
+  std::vector<Change> drilled(stroke_.begin(), stroke_.end());  // no larger than it must be
+  stroke_.clear();
+  if (std::exchange(missed_, false)) return;  // only its end is known
+  stroke_bytes_ += drilled.size() * sizeof(Change);
+  Done stroke;
+  stroke.kind = ActionKind::stroke;
+  stroke.drilled = std::move(drilled);
+  done_.insert(done_.begin() + static_cast<std::ptrdiff_t>(told_), std::move(stroke));
+  ++told_;
+  // With what came before it: undo leaves nothing out on its way back.
+  while (stroke_bytes_ > kMostStrokeBytes) {
+    const auto oldest = std::find_if(done_.begin(), done_.end(), [](const Done& d) { return d.kind == ActionKind::stroke; });
+    const auto steps = oldest + 1 - done_.begin();
+    stroke_bytes_ -= oldest->drilled.size() * sizeof(Change);
+    done_.erase(done_.begin(), oldest + 1);
+    told_ -= static_cast<std::size_t>(steps);
+    steps_forgotten_ += static_cast<std::uint64_t>(steps);
+  }
+}
+
+void World::tell(const SceneAction& action) {
+  if (action.is(ActionKind::stroke)) return end_stroke();
+  const bool is_step = row_of(action).changes_world && !action.is(ActionKind::undo);
+  if (!is_step || told_ == done_.size()) return;
+  if (missed_) {
+    // Whatever was missed may belong to the same drag: then only its end is known.
+    const bool may_go_on = action.is(ActionKind::move) || action.is(ActionKind::open);
+    in_stroke_.clear();
+    stroke_.clear();
+    if (may_go_on) {
+      done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(told_));
+      return;
+    }
+    missed_ = false;
+  }
+  end_stroke();
+  if (told_ > 0 && goes_on(done_[told_ - 1], done_[told_])) {
+    done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(told_));  // where it began is known
+  } else {
+    ++told_;
+  }
+}
+
+void World::forget() {
+  steps_forgotten_ += told_ + (stroke_.empty() ? 0 : 1);
+  done_.erase(done_.begin(), done_.begin() + static_cast<std::ptrdiff_t>(told_));
+  told_ = 0;
+  stroke_bytes_ = 0;
+  in_stroke_.clear();
+  stroke_.clear();
+  missed_ = true;
 }
 
 std::vector<std::uint32_t> World::joined_to(std::uint32_t body, std::uint32_t except) const {
@@ -162,15 +235,19 @@ std::uint32_t World::not_under_plate(const SceneAction& attach) const {
 
 World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
   Effect effect;
-  const bool was_held = std::exchange(held_, a.is(ActionKind::hold));
+  const ActionRow& row = row_of(a);
+  if (a.is(ActionKind::hold) || row.ends_hold) held_ = a.is(ActionKind::hold);
   for (const double v : a.values) {
     if (!std::isfinite(v)) return nothing("a number of the action is not finite");
   }
+  if (a.hand >= kMostHands) return nothing("there is no hand " + std::to_string(a.hand));
   const auto known = [&](std::uint32_t id) { return find(id) != nullptr; };
   const auto fixture = std::find_if(fixtures_.begin(), fixtures_.end(), [&](const Fixture& f) { return f.id == a.item; });
   switch (static_cast<ActionKind>(a.kind)) {
     case ActionKind::hold:
     case ActionKind::resume:
+    case ActionKind::soft_push:
+    case ActionKind::setting:
       break;
     case ActionKind::saw:
       return saw(a);
@@ -178,22 +255,18 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       return split(a, components);
     case ActionKind::undo:
       return undo();
+    case ActionKind::stroke:
+      return nothing("a stroke ends by itself, when the burr takes no more bone");
     case ActionKind::suction:
     case ActionKind::irrigate:
-      held_ = was_held;
       if (a.values[4] > 0 && !(a.values[3] > 0 && a.values[3] <= SceneAction::kMostReachMm))
         return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
                        " mm make sense");
       break;
-    case ActionKind::yield:
-      held_ = was_held;
-      break;
     case ActionKind::grip:
-      held_ = was_held;
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
       if (a.item != SceneAction::kNobody && a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));
-      plate_ = a.item;
-      grip_ = a.transform();
+      grips_[a.hand] = {a.item, a.transform()};
       break;
     case ActionKind::move: {
       if (!known(a.body)) return nothing("there is no piece " + std::to_string(a.body));
@@ -202,7 +275,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       const RigidTransform by = a.transform() * find(a.body)->world_from_body.inverse();
       move_group(joined_to(a.body, SceneAction::kNobody), by);
       placed(a.body)->world_from_body = a.transform();  // to the bit
-      remember(std::move(before));
+      done_.push_back(std::move(before));
       break;
     }
     case ActionKind::attach: {
@@ -213,7 +286,7 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       if (const std::uint32_t off = not_under_plate(a); off != SceneAction::kNobody)
         return nothing("the plate is not on piece " + std::to_string(off) + ": no bone of it begins within " +
                        format_number(SceneAction::kPlateReachMm) + " mm below its underside");
-      remember(snapshot(ActionKind::attach));
+      done_.push_back(snapshot(ActionKind::attach));
       Fixture f;
       f.id = next_fixture_++;
       f.plate = a.item;
@@ -221,12 +294,12 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       f.other = a.other;
       f.body_from_plate = find(a.body)->world_from_body.inverse() * a.transform();
       fixtures_.push_back(f);
-      plate_ = SceneAction::kNobody;
+      grips_[a.hand].plate = SceneAction::kNobody;
       break;
     }
     case ActionKind::detach:
       if (fixture == fixtures_.end()) return nothing("there is no plate fixed as number " + std::to_string(a.item));
-      remember(snapshot(ActionKind::detach));
+      done_.push_back(snapshot(ActionKind::detach));
       fixtures_.erase(fixture);
       break;
     case ActionKind::open: {
@@ -243,11 +316,11 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
       const Vec3 along = (find(fixture->body)->world_from_body * fixture->body_from_plate).rotation.column[0];
       move_group(group, {Mat3{}, along * (opening - fixture->opening_mm)});
       fixture->opening_mm = opening;
-      remember(std::move(before));
+      done_.push_back(std::move(before));
       break;
     }
     default:
-      return nothing("unknown action " + std::to_string(a.kind));
+      return nothing("unknown action " + std::to_string(a.kind) + ": a kind that this version does not have");
   }
   return effect;
 }
@@ -283,7 +356,7 @@ World::Effect World::saw(const SceneAction& a) {
     placed.body = std::move(sawn);
   }
   if (effect.changed.empty()) return nothing("the saw meets no bone");
-  remember(std::move(before));
+  done_.push_back(std::move(before));
   return effect;
 }
 
@@ -332,15 +405,21 @@ World::Effect World::split(const SceneAction& a, const ComponentsOf& components)
   bodies_.insert(bodies_.end(), made.begin(), made.end());
   next_body_ = next_body;
   next_brick_ = next_brick;
-  remember(std::move(before));
+  done_.push_back(std::move(before));
   return effect;
 }
 
 World::Effect World::undo() {
-  if (done_.empty()) return nothing("there is nothing to take back");
+  if (!missed_) end_stroke();  // whoever undoes is up to date, or has no strokes
+  if (missed_ || done_.empty())
+    return nothing(steps_forgotten_ == 0 && !missed_ ? "there is nothing to take back"
+                                                     : "what was done before is no longer known, and stays");
   Effect effect;
+  while (done_.size() > 1 && goes_on(done_[done_.size() - 2], done_.back())) done_.pop_back();  // where it began
   const Done last = std::move(done_.back());
   done_.pop_back();
+  told_ = std::min(told_, done_.size());
+  stroke_bytes_ -= last.drilled.size() * sizeof(Change);
   // New grids in place of those that get density back.
   std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> touched;
   const auto renewed = [&](std::uint32_t id) -> std::pair<Body*, std::vector<std::uint32_t>*> {
@@ -374,19 +453,24 @@ World::Effect World::undo() {
     const PlacedBody* const b = owner(name);
     give_back(b->body->id, name - b->body->name_of(0), density);
   }
+  const auto take_back = [&](std::uint32_t id, VoxelKey own, const Change& c) {
+    const auto [body, bricks] = renewed(id);
+    const float now = body->bone.value(own);
+    // To the bit where nothing was drilled since.
+    give_back(id, own, 0);
+    body->bone.set(own, now == c.after ? c.before : std::clamp(now + c.before - c.after, 0.0F, 1.0F));
+  };
   for (const auto& [id, changes] : last.sawn) {
-    for (const Change& c : changes) {
-      const auto [body, bricks] = renewed(id);
-      const float now = body->bone.value(c.voxel);
-      // To the bit where nothing was drilled since.
-      give_back(id, c.voxel, 0);
-      body->bone.set(c.voxel, now == c.after ? c.before : std::clamp(now + c.before - c.after, 0.0F, 1.0F));
-    }
+    for (const Change& c : changes) take_back(id, c.voxel, c);
+  }
+  for (const Change& c : last.drilled) {
+    const PlacedBody* const b = owner(c.voxel);
+    take_back(b->body->id, c.voxel - b->body->name_of(0), c);
   }
   for (const auto& [id, pose] : last.poses) {
     if (PlacedBody* const b = placed(id); b != nullptr) b->world_from_body = pose;
   }
-  fixtures_ = last.fixtures;
+  if (last.kind != ActionKind::stroke) fixtures_ = last.fixtures;
   for (auto& [id, bricks] : touched) {
     std::sort(bricks.begin(), bricks.end());
     bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());

@@ -448,8 +448,8 @@ std::map<std::string, std::string> reference_pages(const Program& program) {
   }
   index += "\n## Flags of every stage and command\n\n" + markdown_fields(common_fields());
   index +=
-      "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of strokes](script.schema.json), [bash "
-      "completion](osteo.bash).\n";
+      "\n[Exit codes](exit-codes.md), [schema of pipeline files](pipeline.schema.json), [of scripts of strokes](script.schema.json), "
+      "[actions of sessions](actions.md), [bash completion](osteo.bash).\n";
   pages["README.md"] = index;
   std::string codes = note + "# Exit codes\n\n| code | name | meaning |\n|---|---|---|\n";
   for (const auto& d : exit_code_table)

@@ -73,7 +73,7 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
     const float after = std::max(0.0F, before - std::min(reached_[i], static_cast<float>(share)));
     if (after == before) continue;
     bone.set(h.voxel, after);
-    changes_[changed++] = {h.voxel, after};
+    changes_[changed++] = {h.voxel, after, before};
     removed_mm3 += static_cast<double>(before - after) * voxel_mm3;
   }
   // What emptied voxels could not give, or rounding kept back, waits; but no more than a tick's worth at 10 N.

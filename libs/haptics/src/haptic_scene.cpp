@@ -96,11 +96,9 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
     }
     scene.items.push_back(std::move(item));
   }
-  if (const std::uint32_t plate = world.plate_in_hand(); plate != SceneAction::kNobody) {
-    static_cast<void>(plate_library());
+  if (const std::uint32_t plate = world.grip().plate; plate != SceneAction::kNobody)
     scene.plate = std::make_shared<const PlateInHand>(plate_library()[plate]);
-  }
-  scene.grip = world.grip();
+  scene.grip = world.grip().hand_from_plate;
   scene.make_room();
   return scene;
 }

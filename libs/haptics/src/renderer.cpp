@@ -229,7 +229,7 @@ std::span<const VoxelChange> HapticRenderer::remove(double& removed_mm3) noexcep
     removed_mm3 += removed;
     if (bone.removal_.grains().overflowed()) flags_ |= kNoRoom;
     const VoxelKey first = bone.body_ ? bone.body_->name_of(0) : 0;
-    for (const VoxelChange& c : changes) scene_->changes[count++] = {c.voxel + first, c.density};
+    for (const VoxelChange& c : changes) scene_->changes[count++] = {c.voxel + first, c.density, c.before};
     if (bone.depth_map_) {
       const std::size_t n = std::min(changes.size(), bone.changed_.size());
       for (std::size_t c = 0; c < n; ++c) bone.changed_[c] = changes[c].voxel;

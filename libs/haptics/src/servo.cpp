@@ -16,9 +16,22 @@ void Servo::take_up(std::uint64_t tick) noexcept {
   action.tick = tick;
   if (h->scene != nullptr) renderer_.show(h->scene);
   renderer_.hold(h->held);
-  if (action.is(ActionKind::yield)) renderer_.feel(action);
+  if (action.is(ActionKind::soft_push)) renderer_.feel(action);
   stream_.publish(action);
   inbox_.store(nullptr, std::memory_order_release);
+}
+
+// At the beginning of a tick that is the first after the pause.
+void Servo::tell_stroke(std::uint64_t tick, bool removes) noexcept {
+  if (in_stroke_ && tick - last_removal_ > pause_ticks_) {
+    SceneAction ended = SceneAction::plain(ActionKind::stroke);
+    ended.tick = tick;
+    stream_.publish(ended);
+    in_stroke_ = false;
+  }
+  if (!removes) return;
+  in_stroke_ = true;
+  last_removal_ = tick;
 }
 
 void Servo::finish() noexcept {
@@ -37,6 +50,7 @@ bool Servo::step(std::int64_t lateness_ns) noexcept {
   record.lateness_us = static_cast<float>(lateness_ns) / 1000;
   record.work_us = static_cast<float>(monotonic_ns() - begin) / 1000;
   removed_mm3_.store(removed_mm3() + static_cast<double>(record.removed_mm3), std::memory_order_relaxed);
+  tell_stroke(tick, !changes.empty());
   stream_.publish(record, changes);
   ticks_.store(tick + 1, std::memory_order_relaxed);
   return true;

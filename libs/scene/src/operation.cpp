@@ -5,19 +5,6 @@
 #include <thread>
 
 namespace osteo {
-namespace {
-
-// Or looks at densities (where a plate lies), which must be those that a replay finds.
-bool takes_time(const SceneAction& a) {
-  return a.is(ActionKind::saw) || a.is(ActionKind::split) || a.is(ActionKind::undo) || a.is(ActionKind::attach);
-}
-bool changes_what_is_touched(const SceneAction& a) {
-  return !(a.is(ActionKind::hold) || a.is(ActionKind::resume) || a.is(ActionKind::suction) || a.is(ActionKind::irrigate) ||
-           a.is(ActionKind::yield));
-}
-
-}  // namespace
-
 Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz)
     : world_(std::move(world)), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, device, stream, rate_hz) {
   scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup()));
@@ -37,15 +24,14 @@ void Operation::hand_over(const SceneAction& action, std::unique_ptr<HapticScene
 World::Effect Operation::act(const SceneAction& action, const Done& done, const World::ComponentsOf& components) {
   World::Effect effect = world_.act(action, components);
   if (!effect.done) return effect;
+  const ActionRow& row = row_of(action);
   // What the servo needs and what its followers need, side by side.
   const auto scene_of = [&] { return std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup(), scene_.get())); };
   std::unique_ptr<HapticScene> scene;
-  if (changes_what_is_touched(action)) {
-    auto beside = std::async(takes_time(action) && done ? std::launch::async : std::launch::deferred, scene_of);
-    if (done) done(effect);
+  if (row.changes_touch) {
+    auto beside = std::async(row.reads_bone && done ? std::launch::async : std::launch::deferred, scene_of);
+    if (row.changes_world && done) done(effect);
     scene = beside.get();
-  } else if (done) {
-    done(effect);
   }
   hand_over(action, std::move(scene));
   return effect;
@@ -59,7 +45,7 @@ std::optional<World::Effect> Operation::act_live(const SceneAction& action, cons
   };
   wait();
   if (!servo_.taken()) return std::nullopt;
-  const bool hold = takes_time(action);
+  const bool hold = row_of(action).reads_bone;
   if (hold) {
     act(SceneAction::plain(ActionKind::hold));
     wait();

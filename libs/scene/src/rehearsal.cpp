@@ -18,6 +18,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
       finest_voxel_mm_(world.finest_voxel_mm()),
       operation_(std::move(world), options.haptics, options.anatomy, *device_, stream_, options.rate_hz),
+      hub_(stream_.add_reader(), operation_.world()),
       timed_(options.actions.begin(), options.actions.end()) {
   if (!options_.session_file.empty()) {
     SessionHeader header;
@@ -28,9 +29,10 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
     header.dust = options_.follow.dust;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
-  if (options_.follow.surface || options_.follow.pieces || options_.follow.dust || options_.soft) reader_ = &stream_.add_reader();
-  follower_ = std::make_unique<Follower>(operation_.world(), options_.follow, options_.rate_hz, context);
-  pieces_ = static_cast<int>(follower_->large_pieces().size());
+  hub_.add(operation_.strokes(), false);
+  readers_ = std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context);
+  readers_->add_to(hub_);
+  pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (options_.soft) options_.soft->meet(&operation_.world());
 }
 
@@ -47,18 +49,32 @@ bool Rehearsal::running() const {
 }
 
 std::size_t Rehearsal::drain() {
-  if (reader_ == nullptr) return 0;
-  const std::size_t total = follower_->drain(*reader_);
+  const std::size_t total = hub_.drain();
   if (total == 0) return 0;
-  latest_.store(follower_->latest());
-  if (options_.follow.pieces) pieces_ = static_cast<int>(follower_->large_pieces().size());
+  latest_.store(hub_.latest());
+  if (options_.follow.pieces) pieces_ = static_cast<int>(readers_->large_pieces().size());
   return total;
 }
 
-// False: the servo had ended before.
+void Rehearsal::add_reader(Reader& reader) {
+  const std::lock_guard lock(mutex_);
+  // What was done to the scene last is told to the others first: whoever joins sees the scene behind it.
+  while (!operation_.taken() && running()) std::this_thread::sleep_for(std::chrono::microseconds(100));
+  drain();
+  hub_.add(reader);
+}
+
+void Rehearsal::remove_reader(Reader& reader) {
+  const std::lock_guard lock(mutex_);
+  hub_.remove(reader);
+}
+
+// Under the lock unless live, which takes it. False: the servo had ended before.
 bool Rehearsal::perform(const SceneAction& action, bool live) {
-  const World::ComponentsOf components = [&](std::uint32_t body) { return follower_->components(body); };
-  const Operation::Done done = [&](const World::Effect& e) { follower_->follow(operation_.world(), e); };
+  const World::ComponentsOf components = [&](std::uint32_t body) {
+    return readers_->pieces ? readers_->pieces->components(body) : nullptr;
+  };
+  const Operation::Done done = [&](const World::Effect& e) { hub_.scene_changed(e); };
   World::Effect effect;
   if (live) {
     // Nobody looks at the scene while it changes; the wait for the servo is of a tick or two.
@@ -72,12 +88,11 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
     effect = operation_.act(action, done, components);
   }
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
-  if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(follower_->large_pieces().size());
-  // Soft tissue yields again with its next update.
-  if (!effect.message.empty() && !action.is(ActionKind::yield)) {
+  if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(readers_->large_pieces().size());
+  if (!effect.message.empty() && !row_of(action).made_often) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
-    if (!effect.done) refused_ = std::string(name_of(kind)) + ": " + effect.message;
+    if (!effect.done) refused_ = std::string(name_of(action)) + ": " + effect.message;
     if (!notes_.empty() && notes_.back().kind == kind && notes_.back().done == effect.done && notes_.back().why == effect.message) {
       ++notes_.back().times;
     } else {
@@ -90,27 +105,31 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
 // Soft tissue a hundredth of a second further, where the tool is now.
 std::optional<SceneAction> Rehearsal::move_soft() {
   const std::uint64_t tick = operation_.ticks();
-  const TickRecord& now = follower_->latest();
+  const TickRecord& now = hub_.latest();
   if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
-  const auto yield = options_.soft->update(
+  const auto push = options_.soft->update(
       {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.device.drill_on != 0});
   tissue_mm3_ = options_.soft->cut_off_mm3();
-  return yield;
+  return push;
 }
 
 void Rehearsal::act(const SceneAction& action) {
   const std::lock_guard lock(queue_mutex_);
-  // Of several moves of the same kind that nobody has seen yet the last is enough.
-  const bool again = !queue_.empty() && queue_.back().kind == action.kind && queue_.back().body == action.body &&
-                     queue_.back().item == action.item &&
-                     (action.is(ActionKind::move) || action.is(ActionKind::grip) || action.is(ActionKind::open) ||
-                      action.is(ActionKind::suction) || action.is(ActionKind::irrigate));
+  const auto same = [&](const SceneAction& before) {
+    return before.kind == action.kind && before.body == action.body && before.other == action.other && before.item == action.item &&
+           before.hand == action.hand;
+  };
+  const bool again = row_of(action).last_counts && !queue_.empty() && same(queue_.back());
   if (again) {
     queue_.back() = action;
   } else {
     queue_.push_back(action);
   }
+}
+
+void Rehearsal::note(const std::string& kind, const std::string& json) {
+  if (recorder_) recorder_->note({operation_.ticks(), kind, json});
 }
 
 std::string Rehearsal::take_refusal() {
@@ -122,6 +141,7 @@ std::string Rehearsal::trouble() const {
   const Recorder::Status s = recording();
   if (s.failure) return std::string("recording has ended: ") + s.failure->what();
   if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
+  if (s.notes_lost > 0) return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
   if (s.behind_s > 3) return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
   return device_->trouble();
 }
@@ -157,7 +177,7 @@ void Rehearsal::follow_on() {
       }
     }
     if (action) {
-      if (perform(*action, true) || action->is(ActionKind::yield)) continue;
+      if (perform(*action, true) || row_of(*action).made_often) continue;
       const std::lock_guard lock(queue_mutex_);
       timed_.push_front(*action);
     } else {
@@ -198,19 +218,24 @@ RehearsalSummary Rehearsal::run_to_end(const Context& context) {
 // False: asked to stop.
 bool Rehearsal::run_on(const Context& context) {
   for (;;) {
+    std::unique_lock lock(mutex_, std::defer_lock);
+    // Until the servo has taken it up: who joins meanwhile finds nothing on its way.
     if (!timed_.empty() && timed_.front().tick <= operation_.ticks() && device_->active(operation_.ticks())) {
+      lock.lock();
       perform(timed_.front(), false);
       timed_.pop_front();
     } else if (options_.soft && operation_.ticks() >= soft_tick_ && device_->active(operation_.ticks())) {
       // One action a tick: what was to be done comes first.
+      lock.lock();
       drain();
-      if (const auto yield = move_soft()) perform(*yield, false);
+      if (const auto push = move_soft()) perform(*push, false);
     }
     if (!operation_.step(0)) return true;
     if (operation_.ticks() % 64 != 0) continue;
     if (context.cancelled()) return false;
     if (recorder_) recorder_->drain();
     if (recording().failure) return true;
+    if (!lock.owns_lock()) lock.lock();
     drain();
   }
 }
@@ -224,10 +249,11 @@ RehearsalSummary Rehearsal::finish() {
   operation_.finish();  // what was handed over belongs to the stream, whatever failed
   if (!failure_) {
     try {
+      const std::lock_guard lock(mutex_);
       drain();
       // Due before the last tick or asked for, but the servo had ended first.
       const auto take_due = [&]() -> std::optional<SceneAction> {
-        const std::lock_guard lock(queue_mutex_);
+        const std::lock_guard queue_lock(queue_mutex_);
         auto& from = !timed_.empty() && timed_.front().tick < operation_.ticks() ? timed_ : queue_;
         if (from.empty()) return std::nullopt;
         const SceneAction action = from.front();
@@ -239,12 +265,13 @@ RehearsalSummary Rehearsal::finish() {
         operation_.finish();
         drain();
       }
-      if (reader_ != nullptr) follower_->end(*reader_, operation_.ticks());
-      s.surface_hash = follower_->surface_hash();
-      s.pieces = follower_->large_pieces();
-      if (const Dust* const dust = follower_->dust()) {
-        s.dust = dust->totals();
-        if (follower_->ticks_lost() == 0) dust_hash = dust->hash();  // else the same dust, but later: a replay's lies elsewhere
+      hub_.end(operation_.ticks());
+      s.surface_hash = readers_->surface_hash();
+      s.pieces = readers_->large_pieces();
+      if (readers_->dust) {
+        const Dust& dust = readers_->dust->dust();
+        s.dust = dust.totals();
+        if (hub_.ticks_lost() == 0) dust_hash = dust.hash();  // else the same dust, but later: a replay's lies elsewhere
       }
     } catch (...) {
       failure_ = std::current_exception();
@@ -252,28 +279,28 @@ RehearsalSummary Rehearsal::finish() {
   }
   s.ticks = operation_.ticks();
   s.removed_mm3 = operation_.removed_mm3();
-  s.sawn_mm3 = follower_->sawn_mm3();
+  s.sawn_mm3 = readers_->tools.sawn_mm3();
   s.tissue_mm3 = tissue_mm3_;
   // After a failure nobody knows whether all of it went into the stream.
   if (!failure_) s.bone_hash = operation_.world().hash();
-  s.ticks_not_followed = follower_->ticks_lost();
+  s.ticks_not_followed = hub_.ticks_lost();
   s.voxel_mm3 = voxel_mm3_;
   s.bodies = operation_.world().bodies().size();
   s.fixtures = operation_.world().fixtures();
   s.structures = operation_.renderer().structure_events();
   s.notes = notes_;
-  s.unusable_poses = follower_->unusable_poses();
+  s.unusable_poses = readers_->tools.unusable_poses();
   if (loop_) s.loop = loop_->stats();
-  for (const std::uint8_t tool : follower_->burrs_used()) {
+  for (const std::uint8_t tool : readers_->tools.burrs_used()) {
     const Burr& burr = burr_library()[std::min<std::size_t>(tool, burr_library().size() - 1)];
     if (std::string text = too_small_for_voxels(burr, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
   }
-  if (const std::uint64_t n = follower_->ticks_without_room(); n > 0)
+  if (const std::uint64_t n = readers_->tools.ticks_without_room(); n > 0)
     s.warnings.push_back("in " + std::to_string(n) +
                          " ticks bone was left at the burr's rim, since too much of the bone is drilled in part to remember it all: larger "
                          "voxels, or a smaller region, need less");
   if (recorder_) {
-    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash}, [&](std::vector<VoxelChange>& all) {
+    recorder_->finish({s.ticks, s.bone_hash, s.surface_hash, s.removed_mm3, dust_hash, 0, 0}, [&](std::vector<VoxelChange>& all) {
       for (const PlacedBody& b : operation_.world().bodies()) {
         const BrickGrid& bone = b.body->bone;
         for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) all.push_back({b.body->name_of(v), bone.value(v)});
@@ -282,6 +309,7 @@ RehearsalSummary Rehearsal::finish() {
     s.session_bytes = recorder_->bytes();
     s.gaps = recorder_->gaps();
     s.ticks_not_recorded = recorder_->status().ticks_lost;
+    s.notes_not_recorded = recorder_->status().notes_lost;
     if (const auto failure = recorder_->status().failure; failure && !failure_) failure_ = std::make_exception_ptr(Error(*failure));
   }
   if (failure_) std::rethrow_exception(failure_);
@@ -289,9 +317,9 @@ RehearsalSummary Rehearsal::finish() {
   return s;
 }
 
-void Rehearsal::look(const std::function<void(const World&, Follower&)>& f) {
+void Rehearsal::look(const std::function<void(const World&, SceneReaders&)>& f) {
   const std::lock_guard lock(mutex_);
-  f(operation_.world(), *follower_);
+  f(operation_.world(), *readers_);
 }
 
 }  // namespace osteo

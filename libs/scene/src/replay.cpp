@@ -1,145 +1,245 @@
+#include <algorithm>
 #include <chrono>
-#include <cstddef>
-#include <cstring>
+#include <deque>
 
 #include "osteo/base/error.h"
+#include "osteo/base/param.h"
 #include "osteo/scene/rehearsal.h"
 
 namespace osteo {
 
 namespace {
 
-// From where an earlier call ended.
-struct Applied {
-  std::size_t changes = 0, actions = 0;
+void apply(const SessionPart& part, World& world) {
+  for (const SceneAction& a : part.actions) {
+    if (!row_of(a).by_servo) world.act(a);
+    world.tell(a);
+  }
+  for (const VoxelChange& c : part.changes) {
+    const PlacedBody* const b = world.owner(c.voxel);
+    if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
+    BrickGrid& bone = b->body->bone;
+    const VoxelKey own = c.voxel - b->body->name_of(0);
+    // The last density of a voxel before each action that parts changes is enough: strokes end there, and what was before is in the bone.
+    const VoxelChange change{c.voxel, c.density, bone.value(own)};
+    bone.set(own, c.density);
+    world.tell({&change, 1});
+  }
+}
+
+// Gives the servo the sample of the tick that is repeated.
+class RecordedHand final : public Device {
+ public:
+  DeviceSample read(std::uint64_t, double, Vec3) noexcept override { return sample; }
+  DeviceSample sample;
 };
 
-void apply(const Session& session, World& world, Applied& done, std::size_t changes_end, std::size_t actions_end) {
-  const auto apply_until = [&](std::size_t end) {
-    for (; done.changes < end; ++done.changes) {
-      const VoxelChange& c = session.changes[done.changes];
-      const PlacedBody* const b = world.owner(c.voxel);
-      if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-      b->body->bone.set(c.voxel - b->body->name_of(0), c.density);
-    }
-  };
-  for (; done.actions < actions_end; ++done.actions) {
-    apply_until(session.actions[done.actions].changes_before);
-    world.act(session.actions[done.actions].action);
-  }
-  apply_until(changes_end);
-}
-
-}  // namespace
-
-void apply_recorded(const Session& session, World& world, const Gap* until) {
-  Applied done;
-  apply(session, world, done, until ? until->changes_before : session.changes.size(),
-        until ? until->actions_before : session.actions.size());
-}
-
-ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context) {
-  const auto begin = std::chrono::steady_clock::now();
-  ReplayResult result;
-  if (start.hash() != session.header.bone_hash) {
+void check_same_case(const SessionReader& session, const World& start, const Anatomy& anatomy) {
+  const SessionHeader& header = session.header();
+  if (const std::string& why = session.outline().not_replayable; !why.empty())
+    throw Error(ExitCode::corrupt, "the session cannot be repeated by this version: " + why,
+                "replay it with " + header.program_version + "; 'osteo export', 'osteo plan' and --resume use it all the same");
+  if (start.hash() != header.bone_hash) {
     throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
                 "give the case it was recorded on, unchanged");
   }
-  if (session.header.haptics.hardness.value_or(false) != (anatomy.hardness != nullptr)) {
+  if (header.haptics.hardness.value_or(false) != (anatomy.hardness != nullptr)) {
     throw Error(ExitCode::usage, "the session went by the hardness of the bone, which this case does not tell",
                 "the case needs its hu.vdb");
   }
-  if (session.header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : "")) {
+  if (header.haptics.structures != (anatomy.structures ? anatomy.structures->hash() : "")) {
     throw Error(ExitCode::corrupt, "the session watched other structures at risk than this case has",
                 "give the case it was recorded on, unchanged");
   }
-  // Up to the first gap; behind it only bone is known.
-  const Gap* const gap = session.gaps.empty() ? nullptr : &session.gaps.front();
-  const std::span repeated(session.ticks.data(), gap ? gap->ticks_before : session.ticks.size());
-  const auto actions_end = session.actions.begin() + static_cast<std::ptrdiff_t>(gap ? gap->actions_before : session.actions.size());
-  result.losses = losses(session);
-  std::vector<DeviceSample> samples;
-  samples.reserve(repeated.size());
-  for (const TickRecord& t : repeated) samples.push_back(t.device);
-  World from_changes = start.copy();  // the second way: apply the recorded changes
-  ReplayDevice device(std::move(samples));
-  Stream stream;
-  StreamReader& reader = stream.add_reader();
-  // Dust follows from the stream, so it has to come out the same as well.
-  StreamReader* const dust_reader = session.header.dust ? &stream.add_reader() : nullptr;
-  Operation operation(std::move(start), session.header.haptics, anatomy, device, stream, session.header.rate_hz);
-  std::unique_ptr<Follower> dust;
-  if (dust_reader != nullptr)
-    dust = std::make_unique<Follower>(operation.world(), FollowerParts{false, false, true}, session.header.rate_hz, context);
-  std::vector<VoxelChange> changes(1 << 16);
-  SceneAction action;
-  const auto differ = [&](const std::string& what) {
-    if (result.difference.empty()) result.difference = what;
-  };
-  auto next = session.actions.begin();
-  const auto act = [&] {
-    if (dust) dust->drain(*dust_reader);
-    const bool scene = !next->action.is(ActionKind::hold) && !next->action.is(ActionKind::resume);
-    const World::Effect effect = operation.act(next->action, [&](const World::Effect& e) {
-      if (dust && scene) dust->follow(operation.world(), e);
-    });
+}
+
+// The servo once more, and the recorded changes beside it.
+class Replaying {
+ public:
+  Replaying(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context, std::span<Reader* const> readers)
+      : session_(session),
+        context_(context),
+        known_until_(session.outline().bone_known_until()),
+        from_changes_(start.copy()),
+        from_checkpoints_(start.copy()),
+        checkpoints_(session.checkpoints()),
+        reader_(stream_.add_reader()),
+        operation_(std::move(start), session.header().haptics, anatomy, hand_, stream_, session.header().rate_hz),
+        hub_(stream_.add_reader(), operation_.world()),
+        // Dust follows from the stream, so it has to come out the same as well.
+        readers_(operation_.world(), {false, false, session.header().dust}, session.header().rate_hz, context) {
+    hub_.add(operation_.strokes(), false);
+    readers_.add_to(hub_);
+    for (Reader* const r : readers) hub_.add(*r);
+  }
+
+  void take(const SessionPart& part) {
+    if (part.gap != nullptr) end_repeating(*part.gap);
+    if (part.gap != nullptr && part.gap == known_until_) changes_apply_ = false;
+    if (changes_apply_) apply(part, from_changes_);
+    result_.actions += part.actions.size();
+    if (repeating_) actions_.insert(actions_.end(), part.actions.begin(), part.actions.end());
+    for (const TickRecord& t : part.ticks) {
+      if (repeating_)
+        repeat(t);
+      else
+        result_.removed_mm3 += static_cast<double>(t.removed_mm3);
+      ++result_.ticks;
+    }
+    if (part.checkpoint && repeating_) compare_at(*part.checkpoint);
+  }
+
+  ReplayResult finish() {
+    const SessionOutline& o = session_.outline();
+    if (repeating_) do_all();
+    if (repeating_) end_readers();
+    if (repeating_ && from_changes_.hash() != operation_.world().hash()) differ_in_bone();
+    result_.structures = operation_.renderer().structure_events();
+    result_.losses = losses(o);
+    result_.bone_hash = from_changes_.hash();
+    result_.surface_hash = SurfaceReader(from_changes_, context_).hash();
+    if (readers_.dust && repeating_) result_.dust_hash = readers_.dust->dust().hash();
+    result_.complete = o.end.has_value();
+    if (o.end && known_until_ == nullptr) {
+      const auto compare = [&](const std::string& recorded, const std::string& now, const char* what) {
+        if (!recorded.empty() && recorded != now) differ(std::string("the ") + what + " came out differently");
+      };
+      compare(o.end->bone_hash, result_.bone_hash, "bone");
+      compare(o.end->surface_hash, result_.surface_hash, "surface");
+      if (repeating_) compare(o.end->dust_hash, result_.dust_hash, "dust");
+    }
+    if (result_.difference_since_s)
+      result_.difference += ", between the checkpoints at " + format_number(*result_.difference_since_s) + " s and " +
+                            (failed_before_s_ ? format_number(*failed_before_s_) + " s" : "the end");
+    result_.world = std::make_shared<const World>(std::move(from_changes_));
+    result_.identical = result_.difference.empty();
+    return std::move(result_);
+  }
+
+ private:
+  void differ(const std::string& what) {
+    if (!result_.difference.empty()) return;
+    result_.difference = what;
+    result_.difference_since_s = seconds(checkpoint_);
+  }
+  void differ_in_bone() { differ("the recorded voxel changes give another bone than the recorded poses"); }
+  [[nodiscard]] double seconds(std::uint64_t tick) const { return static_cast<double>(tick) / session_.header().rate_hz; }
+
+  // The next whose tick has come.
+  void act() {
+    const SceneAction action = actions_.front();
+    actions_.pop_front();
+    if (row_of(action).by_servo) {  // not done again: it has to come again
+      if (own_.empty() || own_.front() != std::pair(action.kind, action.tick)) {
+        differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) + "' came out differently");
+      } else {
+        own_.pop_front();
+      }
+      return;
+    }
+    hub_.drain();
+    const World::Effect effect = operation_.act(action, [&](const World::Effect& e) { hub_.scene_changed(e); });
     if (!effect.done)
-      differ("at tick " + std::to_string(next->action.tick) + " '" + std::string(name_of(static_cast<ActionKind>(next->action.kind))) +
-             "' could not be done: " + effect.message);
-    ++next;
-  };
-  for (const TickRecord& recorded : repeated) {
+      differ("at tick " + std::to_string(action.tick) + " '" + std::string(name_of(action)) + "' could not be done: " + effect.message);
+  }
+  // Behind the last tick.
+  void do_all() {
+    for (; !actions_.empty(); operation_.finish()) act();
+    if (!own_.empty()) differ("a stroke ended at tick " + std::to_string(own_.front().second) + " that was not recorded");
+  }
+  void end_readers() {
+    hub_.drain();
+    hub_.end(result_.ticks_repeated);
+  }
+
+  void repeat(const TickRecord& recorded) {
     if (recorded.tick % 256 == 0) {
-      context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(repeated.size()), "replay");
-      if (dust) dust->drain(*dust_reader);
+      context_.progress(0.9 * static_cast<double>(result_.ticks) / static_cast<double>(session_.outline().tick_records), "replay");
+      hub_.drain();
     }
-    if (next != actions_end && next->action.tick == recorded.tick) act();
-    operation.step(0);
+    // At most one a tick is done; the servo's own come with its step.
+    if (!actions_.empty() && actions_.front().tick <= recorded.tick && !row_of(actions_.front()).by_servo) act();
+    hand_.sample = recorded.device;
+    operation_.step(0);
     TickRecord now;
-    reader.ticks.pop({&now, 1});
-    while (reader.changes.pop(changes) > 0) {
+    reader_.ticks.pop({&now, 1});
+    while (reader_.changes.pop(changes_) > 0) {
     }
-    while (reader.actions.pop({&action, 1}) > 0) {
+    for (SceneAction done; reader_.actions.pop({&done, 1}) > 0;) {
+      if (row_of(done).by_servo) own_.emplace_back(done.kind, done.tick);
     }
-    // Bytes, not numbers: the same bits or not.
-    constexpr std::size_t kRepeated = offsetof(TickRecord, work_us);
-    const bool same = std::memcmp(&now, &recorded, kRepeated) == 0;
-    if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
-    result.removed_mm3 += static_cast<double>(now.removed_mm3);
+    while (!actions_.empty() && actions_.front().tick <= recorded.tick && row_of(actions_.front()).by_servo) act();
+    if (const RecordField* const f = first_difference(session_.outline().tick_fields, &now, &recorded))
+      differ("tick " + std::to_string(recorded.tick) + " came out differently (" + std::string(f->name) + ")");
+    result_.removed_mm3 += static_cast<double>(now.removed_mm3);
+    ++result_.ticks_repeated;
   }
-  for (; next != actions_end; operation.finish()) act();  // done in the last moment
-  result.ticks = session.ticks.size();
-  result.ticks_repeated = repeated.size();
-  result.actions = session.actions.size();
-  result.structures = operation.renderer().structure_events();
-  Applied done;
-  if (gap == nullptr || gap->bytes == 0) {  // damage may have taken the changes of the ticks before it
-    apply(session, from_changes, done, gap ? gap->changes_before : session.changes.size(),
-          gap ? gap->actions_before : session.actions.size());
-    if (from_changes.hash() != operation.world().hash()) differ("the recorded voxel changes give another bone than the recorded poses");
+
+  // Behind it only bone is known.
+  void end_repeating(const Gap& gap) {
+    if (!repeating_) return;
+    do_all();
+    end_readers();
+    repeating_ = false;
+    // Damage may have taken the changes of the ticks before it.
+    if (gap.bytes == 0 && from_changes_.hash() != operation_.world().hash()) differ_in_bone();
   }
-  const Gap* const known = session.bone_known_until();
-  apply(session, from_changes, done, known ? known->changes_before : session.changes.size(),
-        known ? known->actions_before : session.actions.size());
-  for (std::size_t t = repeated.size(); t < session.ticks.size(); ++t)
-    result.removed_mm3 += static_cast<double>(session.ticks[t].removed_mm3);
-  result.bone_hash = from_changes.hash();
-  const Follower surfaces(from_changes, {true, false, false}, session.header.rate_hz, context);
-  result.surface_hash = surfaces.surface_hash();
-  if (dust && gap == nullptr) {
-    dust->drain(*dust_reader);
-    dust->end(*dust_reader, repeated.size());
-    result.dust_hash = dust->dust()->hash();
+
+  void compare_at(std::uint64_t tick) {
+    do_all();
+    while (const SessionPart* const part = checkpoints_.next()) {
+      if (part->checkpoint) break;
+      apply(*part, from_checkpoints_);
+    }
+    const std::string repeated = operation_.world().hash();
+    if (repeated != from_changes_.hash()) differ_in_bone();
+    if (repeated != from_checkpoints_.hash()) differ("the checkpoint at " + format_number(seconds(tick)) + " s holds another bone");
+    if (result_.difference_since_s && !failed_before_s_) failed_before_s_ = seconds(tick);
+    checkpoint_ = tick;
   }
-  result.complete = session.end.has_value();
-  if (session.end && known == nullptr) {
-    if (!session.end->bone_hash.empty() && session.end->bone_hash != result.bone_hash) differ("the bone came out differently");
-    if (!session.end->surface_hash.empty() && session.end->surface_hash != result.surface_hash) differ("the surface came out differently");
-    if (!session.end->dust_hash.empty() && gap == nullptr && session.end->dust_hash != result.dust_hash)
-      differ("the dust came out differently");
-  }
-  result.world = std::make_shared<const World>(std::move(from_changes));
-  result.identical = result.difference.empty();
+
+  const SessionReader& session_;
+  const Context& context_;
+  const Gap* known_until_;
+  World from_changes_, from_checkpoints_;  // the second way and the third
+  SessionReader::Parts checkpoints_;
+  RecordedHand hand_;
+  Stream stream_;
+  StreamReader& reader_;
+  Operation operation_;
+  ReaderHub hub_;
+  SceneReaders readers_;
+  std::deque<SceneAction> actions_;                          // whose tick has not come
+  std::deque<std::pair<std::uint32_t, std::uint64_t>> own_;  // kind and tick of what the servo told of itself, not compared yet
+  std::vector<VoxelChange> changes_ = std::vector<VoxelChange>(1 << 16);
+  bool repeating_ = true, changes_apply_ = true;
+  std::uint64_t checkpoint_ = 0;
+  std::optional<double> failed_before_s_;
+  ReplayResult result_;
+};
+
+}  // namespace
+
+void apply_recorded(const SessionReader& session, World& world) {
+  auto parts = session.parts();
+  while (const SessionPart* const part = parts.next()) apply(*part, world);
+}
+
+std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick) {
+  std::uint64_t reached = 0;
+  auto parts = session.scene_at(tick, reached);
+  while (const SessionPart* const part = parts.next()) apply(*part, world);
+  return reached;
+}
+
+ReplayResult replay(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context,
+                    std::span<Reader* const> readers) {
+  const auto begin = std::chrono::steady_clock::now();
+  check_same_case(session, start, anatomy);
+  Replaying again(session, std::move(start), anatomy, context, readers);
+  auto parts = session.parts();
+  while (const SessionPart* const part = parts.next()) again.take(*part);
+  ReplayResult result = again.finish();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

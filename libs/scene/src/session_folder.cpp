@@ -1,6 +1,7 @@
 #include "osteo/scene/session_folder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
@@ -10,6 +11,7 @@
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/session/haptic_settings.h"
+#include "osteo/session/session_reader.h"
 
 namespace osteo {
 namespace {
@@ -74,33 +76,53 @@ World world_at_begin(const SessionFolder& session, const Case& the_case, const A
   return world_at_end(open_session_folder(session.resumed_from, session.case_folder), the_case, anatomy, context);
 }
 
-World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+namespace {
+
+// An open session and the scene at its beginning.
+std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy,
+                                         const Context& context) {
   World world = world_at_begin(session, the_case, anatomy, context);
-  const Session recorded = read_session(session.stream());
+  SessionReader recorded(session.stream());
   const std::string name = "the session '" + session.folder.string() + "'";
-  if (world.hash() != recorded.header.bone_hash) {
+  if (world.hash() != recorded.header().bone_hash) {
     throw Error(ExitCode::corrupt, name + " was recorded on another bone than its case holds now",
                 "give the case it was recorded on, unchanged");
   }
-  for (const std::string& line : losses(recorded)) context.warn(name + ": " + line);
-  const auto lost = std::find_if(recorded.gaps.begin(), recorded.gaps.end(), [](const Gap& g) { return g.bone_lost; });
-  if (lost == recorded.gaps.end()) {
+  for (const std::string& line : losses(recorded.outline())) context.warn(name + ": " + line);
+  for (const std::string& line : recorded.outline().newer) context.warn(name + " is of a later version: left out " + line);
+  return {std::move(recorded), std::move(world)};
+}
+
+}  // namespace
+
+World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+  auto [recorded, world] = begin_of(session, the_case, anatomy, context);
+  apply_recorded_until(recorded, world, static_cast<std::uint64_t>(std::llround(t_s * recorded.header().rate_hz)));
+  return std::move(world);
+}
+
+World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+  auto [recorded, world] = begin_of(session, the_case, anatomy, context);
+  const SessionOutline& o = recorded.outline();
+  const auto lost = std::find_if(o.gaps.begin(), o.gaps.end(), [](const Gap& g) { return g.bone_lost; });
+  if (lost == o.gaps.end()) {
     apply_recorded(recorded, world);
-    if (recorded.end && !recorded.end->bone_hash.empty() && world.hash() != recorded.end->bone_hash) {
+    if (o.end && !o.end->bone_hash.empty() && world.hash() != o.end->bone_hash) {
       throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
     }
-    return world;
+    return std::move(world);
   }
   // All bone was written once more at the end, if the session came to one.
   World before = world.copy();
   try {
     apply_recorded(recorded, world);
-    if (recorded.end && world.hash() == recorded.end->bone_hash) return world;
+    if (o.end && world.hash() == o.end->bone_hash) return std::move(world);
   } catch (const Error&) {
     // It changes voxels of pieces that came to be while nothing was recorded.
   }
-  context.warn(name + ": what it did from tick " + std::to_string(lost->first_tick) + " on cannot be used; the bone is as it was before");
-  apply_recorded(recorded, before, &*lost);
+  context.warn("the session '" + session.folder.string() + "': what it did from tick " + std::to_string(lost->first_tick) +
+               " on cannot be used; the bone is as it was before");
+  apply_recorded_until(recorded, before, lost->first_tick);
   return before;
 }
 
@@ -206,8 +228,9 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (!s.gaps.empty() || s.ticks_not_recorded > 0) {
     j["ticks_not_recorded"] = s.ticks_not_recorded;
     for (const RecordingGap& g : s.gaps)
-      j["gaps"].push_back({{"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bone_changes_lost", g.bone_lost != 0}});
+      j["gaps"].push_back({{"first_tick", g.first_tick}, {"ticks", g.ticks}, {"bone_changes_lost", g.bone_lost}});
   }
+  if (s.notes_not_recorded > 0) j["notes_not_recorded"] = s.notes_not_recorded;
   if (s.ticks_not_followed > 0) j["ticks_not_followed"] = s.ticks_not_followed;
   if (s.interrupted) j["interrupted"] = true;
   if (s.unusable_poses > 0) j["pose_unusable_s"] = static_cast<double>(s.unusable_poses) / rate_hz;

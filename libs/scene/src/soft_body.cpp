@@ -183,8 +183,8 @@ std::optional<SceneAction> SoftBody::update(const SoftTool& tool) {
   if (tool.turns && pushes) m.cut(tool, size);
   if (!pushes && !m.pushed) return std::nullopt;
   m.pushed = pushes;
-  if (!pushes) return SceneAction::yield(tool.at_mm, {}, 0, 0);
-  return SceneAction::yield(tool.at_mm, force / size, size, kFeltStiffness * met);
+  if (!pushes) return SceneAction::soft_push(tool.at_mm, {}, 0, 0);
+  return SceneAction::soft_push(tool.at_mm, force / size, size, kFeltStiffness * met);
 }
 
 std::vector<Vec3> SoftBody::points_mm() const {

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <deque>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
@@ -15,70 +16,20 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
-#include "osteo/bone/burr.h"
 
 namespace osteo {
 namespace {
 
 using nlohmann::ordered_json;
 
-/// A column of the export: one number of a tick. Units are also in the name, but where it has none.
-struct Column {
-  const char* name;
-  const char* unit;
-  double (*value)(const TickRecord&);
-  bool whole;
-};
-constexpr Column kColumns[] = {
-    {"tick", "1", [](const TickRecord& t) { return static_cast<double>(t.tick); }, true},
-    {"x_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[0]); }, false},
-    {"y_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[1]); }, false},
-    {"z_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[2]); }, false},
-    {"axis_x", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[0]); }, false},
-    {"axis_y", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[1]); }, false},
-    {"axis_z", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[2]); }, false},
-    {"drill_on", "0 or 1", [](const TickRecord& t) { return static_cast<double>(t.device.drill_on); }, true},
-    {"tool", "index", [](const TickRecord& t) { return static_cast<double>(t.device.tool); }, true},
-    {"buttons", "bits", [](const TickRecord& t) { return static_cast<double>(t.device.buttons); }, true},
-    {"device_age_ms", "ms", [](const TickRecord& t) { return static_cast<double>(t.device.age_ms); }, true},
-    {"force_x_n", "N", [](const TickRecord& t) { return static_cast<double>(t.force_n[0]); }, false},
-    {"force_y_n", "N", [](const TickRecord& t) { return static_cast<double>(t.force_n[1]); }, false},
-    {"force_z_n", "N", [](const TickRecord& t) { return static_cast<double>(t.force_n[2]); }, false},
-    {"torque_x_n_mm", "N mm", [](const TickRecord& t) { return static_cast<double>(t.torque_n_mm[0]); }, false},
-    {"torque_y_n_mm", "N mm", [](const TickRecord& t) { return static_cast<double>(t.torque_n_mm[1]); }, false},
-    {"torque_z_n_mm", "N mm", [](const TickRecord& t) { return static_cast<double>(t.torque_n_mm[2]); }, false},
-    {"shown_offset_x_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[0]); }, false},
-    {"shown_offset_y_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[1]); }, false},
-    {"shown_offset_z_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[2]); }, false},
-    {"normal_force_n", "N", [](const TickRecord& t) { return static_cast<double>(t.normal_force_n); }, false},
-    {"depth_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.depth_mm); }, false},
-    {"removed_mm3", "mm3", [](const TickRecord& t) { return static_cast<double>(t.removed_mm3); }, false},
-    {"voxels_changed", "voxels", [](const TickRecord& t) { return static_cast<double>(t.voxels_changed); }, true},
-    {"immersed", "voxels", [](const TickRecord& t) { return static_cast<double>(t.immersed); }, true},
-    {"flags", "bits", [](const TickRecord& t) { return static_cast<double>(t.flags); }, true},
-    {"energy_mj", "mJ", [](const TickRecord& t) { return static_cast<double>(t.energy_mj); }, false},
-    {"thickness_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.thickness_mm); }, false},
-    {"clearance_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.clearance_mm); }, false},
-    {"structure", "label value", [](const TickRecord& t) { return static_cast<double>(t.structure); }, true},
-    {"work_us", "us", [](const TickRecord& t) { return static_cast<double>(t.work_us); }, false},
-    {"lateness_us", "us", [](const TickRecord& t) { return static_cast<double>(t.lateness_us); }, false},
-};
-
-/// As short as reads back to the same number: floats are floats.
-std::string number(const Column& c, const TickRecord& t) {
+// As short as reads back to the same number: floats are floats.
+std::string number(const RecordField& f, const void* record) {
+  const double value = value_of(f, record);
+  if (f.type == FieldType::f64) return format_number(value);
   char text[32];
-  const auto end = c.whole ? std::to_chars(text, text + sizeof text, static_cast<std::int64_t>(c.value(t)))
-                           : std::to_chars(text, text + sizeof text, static_cast<float>(c.value(t)));
+  const auto end = is_whole(f.type) ? std::to_chars(text, text + sizeof text, static_cast<std::int64_t>(value))
+                                    : std::to_chars(text, text + sizeof text, static_cast<float>(value));
   return {text, end.ptr};
-}
-
-double seconds_of(const Session& s, std::uint64_t tick) {
-  return static_cast<double>(tick) / s.header.rate_hz;
-}
-
-// How many ticks are missing right before each of those that there are, but for none.
-std::uint64_t lost_before(const Session& s, std::size_t i) {
-  return s.ticks[i].tick - (i == 0 ? 0 : s.ticks[i - 1].tick + 1);
 }
 
 /// What write_atomically() writes into, a block at a time.
@@ -98,6 +49,7 @@ class OutFile {
     if (buffer_.size() >= kBlock) flush();
   }
   void close() {
+    if (fd_ < 0) return;
     flush();
     const int rc = ::close(fd_);
     fd_ = -1;
@@ -124,102 +76,172 @@ class OutFile {
   std::string buffer_;
 };
 
-void csv(const Session& s, OutFile& out, const Context& context) {
+// What all formats need of a session while it goes by.
+class Rows {
+ public:
+  Rows(const SessionReader& session, const Context& context) : outline_(session.outline()), context_(context), parts_(session.parts()) {}
+
+  const SessionPart* next() {
+    const double ticks = std::max(1.0, static_cast<double>(outline_.tick_records));
+    const SessionPart* const p = parts_.next();
+    if (p == nullptr) return nullptr;
+    context_.progress(std::min(1.0, static_cast<double>(done_) / ticks), "writing");
+    done_ += p->ticks.size();
+    return p;
+  }
+  [[nodiscard]] double seconds(std::uint64_t tick) const { return static_cast<double>(tick) / outline_.header.rate_hz; }
+  // How many ticks are missing right before this one, but for none.
+  std::uint64_t lost_before(const TickRecord& t) {
+    const std::uint64_t lost = t.tick > next_tick_ ? t.tick - next_tick_ : 0;
+    next_tick_ = t.tick + 1;
+    return lost;
+  }
+  [[nodiscard]] std::string action_name(const SceneAction& a) const {
+    const auto name = outline_.action_names.find(a.kind);
+    return name != outline_.action_names.end() ? name->second : "kind " + std::to_string(a.kind);
+  }
+  [[nodiscard]] const SessionOutline& outline() const { return outline_; }
+
+ private:
+  const SessionOutline& outline_;
+  const Context& context_;
+  SessionReader::Parts parts_;
+  std::uint64_t done_ = 0, next_tick_ = 0;
+};
+
+// How a field of an action is told.
+enum class Told { number, kind, nobody_or_number };
+Told told(const RecordField& f) {
+  if (f.name == "action") return Told::kind;
+  return f.unit.find("4294967295") != std::string_view::npos ? Told::nobody_or_number : Told::number;
+}
+// Where an action has no plate or fixture its item says nothing.
+std::optional<std::uint32_t> who(const RecordField& f, const SceneAction& a) {
+  const bool has_item = a.is(ActionKind::grip) || a.is(ActionKind::attach) || a.is(ActionKind::detach) || a.is(ActionKind::open);
+  if (f.name == "item" && !has_item) return std::nullopt;
+  const auto id = static_cast<std::uint32_t>(value_of(f, &a));
+  return id == SceneAction::kNobody ? std::nullopt : std::optional(id);
+}
+bool is_value(const RecordField& f) {
+  return f.name.starts_with("value_");
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + "\"";
+}
+
+void csv(Rows rows, OutFile& ticks, OutFile& actions, OutFile& notes) {
   std::string line = "time_s";
-  for (const Column& c : kColumns) line += std::string(",") + c.name;
-  out.write(line + ",ticks_lost_before\n");
-  for (std::size_t i = 0; i < s.ticks.size(); ++i) {
-    if (i % 4096 == 0) context.progress(static_cast<double>(i) / static_cast<double>(s.ticks.size()), "writing");
-    line = format_number(seconds_of(s, s.ticks[i].tick));
-    for (const Column& c : kColumns) line += "," + number(c, s.ticks[i]);
-    out.write(line + "," + std::to_string(lost_before(s, i)) + "\n");
+  for (const RecordField* const f : rows.outline().tick_fields) line += "," + std::string(f->name);
+  ticks.write(line + ",ticks_lost_before\n");
+  line = "time_s";
+  for (const RecordField& f : action_record_table().fields) line += "," + std::string(f.name);
+  actions.write(line + "\n");
+  notes.write("time_s,tick,kind,json\n");
+  while (const SessionPart* const p = rows.next()) {
+    for (const TickRecord& t : p->ticks) {
+      line = format_number(rows.seconds(t.tick));
+      for (const RecordField* const f : rows.outline().tick_fields) line += "," + number(*f, &t);
+      ticks.write(line + "," + std::to_string(rows.lost_before(t)) + "\n");
+    }
+    for (const SceneAction& a : p->actions) {
+      line = format_number(rows.seconds(a.tick));
+      for (const RecordField& f : action_record_table().fields) {
+        const auto id = who(f, a);
+        line += "," + (told(f) == Told::kind     ? rows.action_name(a)
+                       : told(f) == Told::number ? number(f, &a)
+                       : id                      ? std::to_string(*id)
+                                                 : "");
+      }
+      actions.write(line + "\n");
+    }
+    for (const Note& n : p->notes)
+      notes.write(format_number(rows.seconds(n.tick)) + "," + std::to_string(n.tick) + "," + quoted(n.kind) + "," + quoted(n.json) + "\n");
   }
 }
 
-// The plate or fixture of those actions that have one.
-std::uint32_t item_of(const SceneAction& a) {
-  const bool any = a.is(ActionKind::grip) || a.is(ActionKind::attach) || a.is(ActionKind::detach) || a.is(ActionKind::open);
-  return any ? a.item : SceneAction::kNobody;
-}
-
-// A piece, plate or fixture; "" where the action names none.
-std::string who(std::uint32_t id) {
-  return id == SceneAction::kNobody ? "" : std::to_string(id);
-}
-
-void actions_csv(const Session& s, OutFile& out) {
-  std::string line = "time_s,tick,action,piece,second_piece,item";
-  for (int v = 0; v < 12; ++v) line += ",value_" + std::to_string(v);
-  out.write(line + "\n");
-  for (const RecordedAction& r : s.actions) {
-    const SceneAction& a = r.action;
-    line = format_number(seconds_of(s, a.tick)) + "," + std::to_string(a.tick) + "," +
-           std::string(name_of(static_cast<ActionKind>(a.kind))) + "," + who(a.body) + "," + who(a.other) + "," + who(item_of(a));
-    for (const double v : a.values) line += "," + format_number(v);
-    out.write(line + "\n");
-  }
-}
-
-void mcap(const Session& s, OutFile& out, const Context& context) {
-  McapWriter file([&](std::string_view bytes) { out.write(bytes); }, "osteotome " + s.header.program_version);
+void mcap(Rows rows, OutFile& out) {
+  const SessionOutline& o = rows.outline();
+  McapWriter file([&](std::string_view bytes) { out.write(bytes); }, "osteotome " + o.header.program_version);
   const std::vector<std::pair<std::string, std::string>> about{
-      {"rate_hz", format_number(s.header.rate_hz)}, {"bone_hash", s.header.bone_hash}, {"complete", s.end ? "yes" : "no"}};
+      {"rate_hz", format_number(o.header.rate_hz)}, {"bone_hash", o.header.bone_hash}, {"complete", o.end ? "yes" : "no"}};
   const auto schema = [](const char* title) {
     ordered_json j{{"type", "object"}, {"title", title}, {"properties", ordered_json::object()}};
     j["properties"]["time_s"] = {{"type", "number"}, {"unit", "s"}};
     return j;
   };
-  ordered_json ticks = schema("osteotome.Tick");
-  for (const Column& c : kColumns) ticks["properties"][c.name] = {{"type", c.whole ? "integer" : "number"}, {"unit", c.unit}};
-  ordered_json actions = schema("osteotome.Action"), gaps = schema("osteotome.Gap");
-  actions["properties"]["tick"] = {{"type", "integer"}};
-  actions["properties"]["action"] = {{"type", "string"}};
-  for (const char* name : {"piece", "second_piece", "item"})
-    actions["properties"][name] = {{"type", ordered_json::array({"integer", "null"})}};
+  const auto described = [](ordered_json& j, const RecordField& f) {
+    j["properties"][std::string(f.name)] = {
+        {"type", is_whole(f.type) ? "integer" : "number"}, {"unit", f.unit}, {"description", f.meaning}};
+  };
+  ordered_json ticks = schema("osteotome.Tick"), actions = schema("osteotome.Action"), gaps = schema("osteotome.Gap"),
+               notes = schema("osteotome.Note");
+  for (const RecordField* const f : o.tick_fields) described(ticks, *f);
+  for (const RecordField& f : action_record_table().fields) {
+    if (is_value(f)) continue;
+    described(actions, f);
+    if (told(f) == Told::kind) actions["properties"][std::string(f.name)] = {{"type", "string"}};
+    if (told(f) == Told::nobody_or_number) actions["properties"][std::string(f.name)]["type"] = ordered_json::array({"integer", "null"});
+  }
   actions["properties"]["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}};
   for (const char* name : {"first_tick", "ticks", "bytes"}) gaps["properties"][name] = {{"type", "integer"}};
   gaps["properties"]["bone_lost"] = {{"type", "boolean"}};
+  notes["properties"]["tick"] = {{"type", "integer"}};
+  notes["properties"]["kind"] = {{"type", "string"}};
+  notes["properties"]["value"] = ordered_json::object();
   const auto on_ticks = file.add_channel("/ticks", "osteotome.Tick", ticks.dump(), about);
-  const auto on_actions = s.actions.empty() ? std::uint16_t{0} : file.add_channel("/actions", "osteotome.Action", actions.dump(), about);
-  const auto on_gaps = s.gaps.empty() ? std::uint16_t{0} : file.add_channel("/gaps", "osteotome.Gap", gaps.dump(), about);
+  const auto on_actions = file.add_channel("/actions", "osteotome.Action", actions.dump(), about);
+  const auto on_gaps = file.add_channel("/gaps", "osteotome.Gap", gaps.dump(), about);
+  const auto on_notes = file.add_channel("/notes", "osteotome.Note", notes.dump(), about);
 
-  const auto ns = [&](std::uint64_t tick) { return static_cast<std::uint64_t>(seconds_of(s, tick) * 1e9 + 0.5); };
-  const auto or_null = [](std::uint32_t id) { return id == SceneAction::kNobody ? ordered_json() : ordered_json(id); };
-  std::size_t action = 0, gap = 0;
-  // In the order of their times: what was done, or is missing, before a tick.
-  const auto up_to = [&](std::uint64_t tick) {
-    for (; gap < s.gaps.size() && s.gaps[gap].first_tick <= tick; ++gap) {
-      const Gap& g = s.gaps[gap];
-      const ordered_json j{{"time_s", seconds_of(s, g.first_tick)},
-                           {"first_tick", g.first_tick},
-                           {"ticks", g.ticks},
-                           {"bytes", g.bytes},
-                           {"bone_lost", g.bone_lost}};
-      file.message(on_gaps, ns(g.first_tick), j.dump());
-    }
-    for (; action < s.actions.size() && s.actions[action].action.tick <= tick; ++action) {
-      const SceneAction& a = s.actions[action].action;
-      const ordered_json j{{"time_s", seconds_of(s, a.tick)},
-                           {"tick", a.tick},
-                           {"action", name_of(static_cast<ActionKind>(a.kind))},
-                           {"piece", or_null(a.body)},
-                           {"second_piece", or_null(a.other)},
-                           {"item", or_null(item_of(a))},
-                           {"values", a.values}};
+  const auto ns = [&](std::uint64_t tick) { return static_cast<std::uint64_t>(rows.seconds(tick) * 1e9 + 0.5); };
+  // A frame's actions stand before its ticks, each to be told before its own.
+  std::deque<SceneAction> waiting;
+  const auto act_up_to = [&](std::uint64_t tick) {
+    for (; !waiting.empty() && waiting.front().tick <= tick; waiting.pop_front()) {
+      const SceneAction& a = waiting.front();
+      ordered_json j{{"time_s", rows.seconds(a.tick)}};
+      for (const RecordField& f : action_record_table().fields) {
+        if (is_value(f)) continue;
+        const std::string name(f.name);
+        const auto id = who(f, a);
+        if (told(f) == Told::kind)
+          j[name] = rows.action_name(a);
+        else if (told(f) == Told::number)
+          j[name] = static_cast<std::uint64_t>(value_of(f, &a));
+        else
+          j[name] = id ? ordered_json(*id) : ordered_json();
+      }
+      j["values"] = a.values;
       file.message(on_actions, ns(a.tick), j.dump());
     }
   };
   std::string text;
-  for (std::size_t i = 0; i < s.ticks.size(); ++i) {
-    if (i % 4096 == 0) context.progress(static_cast<double>(i) / static_cast<double>(s.ticks.size()), "writing");
-    const TickRecord& t = s.ticks[i];
-    up_to(t.tick);
-    text = "{\"time_s\":" + format_number(seconds_of(s, t.tick));
-    for (const Column& c : kColumns) text += std::string(",\"") + c.name + "\":" + number(c, t);
-    text += "}";
-    file.message(on_ticks, ns(t.tick), text);
+  while (const SessionPart* const p = rows.next()) {
+    waiting.insert(waiting.end(), p->actions.begin(), p->actions.end());
+    for (const TickRecord& t : p->ticks) {
+      act_up_to(t.tick);
+      text = "{\"time_s\":" + format_number(rows.seconds(t.tick));
+      for (const RecordField* const f : o.tick_fields) text += ",\"" + std::string(f->name) + "\":" + number(*f, &t);
+      file.message(on_ticks, ns(t.tick), text + "}");
+    }
+    if (const Gap* const g = p->gap) {
+      act_up_to(g->first_tick);
+      const ordered_json j{{"time_s", rows.seconds(g->first_tick)},
+                           {"first_tick", g->first_tick},
+                           {"ticks", g->ticks},
+                           {"bytes", g->bytes},
+                           {"bone_lost", g->bone_lost}};
+      file.message(on_gaps, ns(g->first_tick), j.dump());
+    }
+    for (const Note& n : p->notes) {
+      const ordered_json j{{"time_s", rows.seconds(n.tick)}, {"tick", n.tick}, {"kind", n.kind}, {"value", ordered_json::parse(n.json)}};
+      file.message(on_notes, ns(n.tick), j.dump());
+    }
   }
-  up_to(~std::uint64_t{0});
+  act_up_to(~std::uint64_t{0});
   file.finish();
 }
 
@@ -248,39 +270,96 @@ class Hdf5 {
     need(g >= 0);
     H5Gclose(g);
   }
-  template <class T>
-  void column(const std::string& name, const std::vector<T>& values, hid_t type, const char* unit) {
-    const hsize_t n = values.size(), chunk = std::min<hsize_t>(std::max<hsize_t>(n, 1), 16384);
-    const hid_t space = H5Screate_simple(1, &n, nullptr), list = H5Pcreate(H5P_DATASET_CREATE);
-    if (n > 0) {
+  /// A data set that grows.
+  class Column {
+   public:
+    Column(const Hdf5& file, const std::string& name, hid_t type, std::string_view unit) : type_(H5Tcopy(type)) {
+      const hsize_t none = 0, any = H5S_UNLIMITED, chunk = kRows;
+      const hid_t space = H5Screate_simple(1, &none, &any), list = H5Pcreate(H5P_DATASET_CREATE);
       H5Pset_chunk(list, 1, &chunk);
-      H5Pset_deflate(list, 3);
+      if (H5Tis_variable_str(type_) <= 0) H5Pset_deflate(list, 3);
+      set_ = H5Dcreate2(file.file_, name.c_str(), type_, space, H5P_DEFAULT, list, H5P_DEFAULT);
+      H5Pclose(list);
+      H5Sclose(space);
+      need(set_ >= 0);
+      if (!unit.empty()) text("unit", std::string(unit), set_);
     }
-    const hid_t set = H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, list, H5P_DEFAULT);
-    const bool written = set >= 0 && (n == 0 || H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
-    if (written) text("unit", unit, set);
-    if (set >= 0) H5Dclose(set);
-    H5Pclose(list);
-    H5Sclose(space);
-    need(written);
-  }
-  /// Names, as strings of one length.
-  void column(const std::string& name, const std::vector<std::string>& values) {
-    std::size_t longest = 1;
-    for (const std::string& v : values) longest = std::max(longest, v.size());
-    std::string all;
-    for (const std::string& v : values) all += v + std::string(longest - v.size(), '\0');
-    const hsize_t n = values.size();
-    const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate_simple(1, &n, nullptr);
-    H5Tset_size(type, longest);
-    H5Tset_strpad(type, H5T_STR_NULLPAD);
-    const hid_t set = H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    const bool written = set >= 0 && (n == 0 || H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) >= 0);
-    if (set >= 0) H5Dclose(set);
-    H5Sclose(space);
-    H5Tclose(type);
-    need(written);
-  }
+    ~Column() {
+      H5Dclose(set_);
+      H5Tclose(type_);
+    }
+    Column(const Column&) = delete;
+    Column& operator=(const Column&) = delete;
+    void write(hsize_t n, const void* values) {
+      if (n == 0) return;
+      const hsize_t all = rows_ + n;
+      need(H5Dset_extent(set_, &all) >= 0);
+      const hid_t there = H5Dget_space(set_), here = H5Screate_simple(1, &n, nullptr);
+      H5Sselect_hyperslab(there, H5S_SELECT_SET, &rows_, nullptr, &n, nullptr);
+      const bool written = H5Dwrite(set_, type_, here, there, H5P_DEFAULT, values) >= 0;
+      H5Sclose(here);
+      H5Sclose(there);
+      need(written);
+      rows_ = all;
+    }
+    static constexpr std::size_t kRows = 16384;
+
+   private:
+    hid_t type_, set_ = -1;
+    hsize_t rows_ = 0;
+  };
+  /// Numbers, collected to as many as are written at once.
+  template <class T>
+  class Numbers {
+   public:
+    Numbers(const Hdf5& file, const std::string& name, std::string_view unit)
+        : column_(file, name,
+                  std::is_same_v<T, double>          ? H5T_NATIVE_DOUBLE
+                  : std::is_same_v<T, float>         ? H5T_NATIVE_FLOAT
+                  : std::is_same_v<T, std::uint32_t> ? H5T_NATIVE_UINT32
+                                                     : H5T_NATIVE_INT64,
+                  unit) {}
+    void add(T value) {
+      values_.push_back(value);
+      if (values_.size() == Column::kRows) flush();
+    }
+    void flush() {
+      column_.write(values_.size(), values_.data());
+      values_.clear();
+    }
+
+   private:
+    Column column_;
+    std::vector<T> values_;
+  };
+  class Texts {
+   public:
+    Texts(const Hdf5& file, const std::string& name) : column_(file, name, Type().id, "") {}
+    void add(std::string value) {
+      values_.push_back(std::move(value));
+      if (values_.size() == 1024) flush();
+    }
+    void flush() {
+      std::vector<const char*> all;
+      for (const std::string& v : values_) all.push_back(v.c_str());
+      column_.write(all.size(), all.data());
+      values_.clear();
+    }
+
+   private:
+    struct Type {
+      Type() {
+        H5Tset_size(id, H5T_VARIABLE);
+        H5Tset_cset(id, H5T_CSET_UTF8);
+      }
+      ~Type() { H5Tclose(id); }
+      Type(const Type&) = delete;
+      Type& operator=(const Type&) = delete;
+      hid_t id = H5Tcopy(H5T_C_S1);
+    };
+    Column column_;
+    std::vector<std::string> values_;
+  };
   void text(const char* name, const std::string& value) { text(name, value, file_); }
   static void text(const char* name, const std::string& value, hid_t of) {
     const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
@@ -308,73 +387,107 @@ class Hdf5 {
   hid_t file_ = -1;
 };
 
-void hdf5(const Session& s, const fs::path& path, const Context& context) {
+void hdf5(Rows rows, const fs::path& path) {
+  const SessionOutline& o = rows.outline();
   Hdf5 file(path);
-  file.text("program", "osteotome " + s.header.program_version);
-  file.text("bone_hash", s.header.bone_hash);
-  file.number("rate_hz", s.header.rate_hz);
-  file.text("complete", s.end ? "yes" : "no");
+  file.text("program", "osteotome " + o.header.program_version);
+  file.text("bone_hash", o.header.bone_hash);
+  file.number("rate_hz", o.header.rate_hz);
+  file.text("complete", o.end ? "yes" : "no");
   std::string burrs;
-  for (const Burr& b : burr_library()) burrs += (burrs.empty() ? "" : "; ") + b.name();
+  for (const std::string& b : o.tools) burrs += (burrs.empty() ? "" : "; ") + b;
   file.text("tools", burrs);
-  std::vector<double> values;
-  std::vector<std::int64_t> whole;
-  const auto numbers = [&](const std::string& name, const char* unit, std::size_t n, auto&& value) {
-    context.check_cancelled();
-    values.resize(n);
-    for (std::size_t i = 0; i < n; ++i) values[i] = value(i);
-    file.column(name, values, H5T_NATIVE_DOUBLE, unit);
-  };
-  const auto integers = [&](const std::string& name, const char* unit, std::size_t n, auto&& value) {
-    context.check_cancelled();
-    whole.resize(n);
-    for (std::size_t i = 0; i < n; ++i) whole[i] = static_cast<std::int64_t>(value(i));
-    file.column(name, whole, H5T_NATIVE_INT64, unit);
-  };
-  file.group("/ticks");
-  numbers("/ticks/time_s", "s", s.ticks.size(), [&](std::size_t i) { return seconds_of(s, s.ticks[i].tick); });
-  for (const Column& c : kColumns) {
-    const auto value = [&](std::size_t i) { return c.value(s.ticks[i]); };
-    const std::string name = std::string("/ticks/") + c.name;
-    if (c.whole) {
-      integers(name, c.unit, s.ticks.size(), value);
-    } else {
-      numbers(name, c.unit, s.ticks.size(), value);
+  for (const char* const group : {"/ticks", "/voxel_changes", "/actions", "/gaps", "/notes"}) file.group(group);
+  {
+    std::deque<Hdf5::Numbers<double>> doubles;
+    std::deque<Hdf5::Numbers<std::int64_t>> whole;
+    std::deque<Hdf5::Texts> texts;
+    const auto real = [&](const std::string& name, std::string_view unit) { return &doubles.emplace_back(file, name, unit); };
+    const auto integer = [&](const std::string& name, std::string_view unit) { return &whole.emplace_back(file, name, unit); };
+    const auto text = [&](const std::string& name) { return &texts.emplace_back(file, name); };
+    // What takes a field of a record.
+    struct Field {
+      const RecordField* field;
+      Hdf5::Numbers<double>* real = nullptr;
+      Hdf5::Numbers<std::int64_t>* integer = nullptr;
+      Hdf5::Texts* text = nullptr;
+    };
+    const auto column_of = [&](const std::string& group, const RecordField& f, bool as_text) {
+      const std::string name = group + "/" + std::string(f.name);
+      if (as_text) return Field{&f, nullptr, nullptr, text(name)};
+      std::string unit(f.unit);
+      if (const auto at = unit.find("4294967295"); at != std::string::npos) unit.replace(at, 10, "-1");
+      if (is_whole(f.type)) return Field{&f, nullptr, integer(name, unit), nullptr};
+      return Field{&f, real(name, f.unit), nullptr, nullptr};
+    };
+    std::vector<Field> tick_columns, action_columns;
+    auto* const time = real("/ticks/time_s", "s");
+    for (const RecordField* const f : o.tick_fields) tick_columns.push_back(column_of("/ticks", *f, false));
+    auto* const lost = integer("/ticks/ticks_lost_before", "ticks");
+    Hdf5::Numbers<std::uint32_t> voxels(file, "/voxel_changes/voxel", "name");
+    Hdf5::Numbers<float> densities(file, "/voxel_changes/density", "share of a voxel");
+    auto* const action_time = real("/actions/time_s", "s");
+    for (const RecordField& f : action_record_table().fields) {
+      action_columns.push_back(column_of("/actions", f, told(f) == Told::kind));
     }
+    auto* const before = integer("/actions/voxel_changes_before", "rows of /voxel_changes");
+    auto* const gap_first = integer("/gaps/first_tick", "1");
+    auto* const gap_ticks = integer("/gaps/ticks", "ticks");
+    auto* const gap_bytes = integer("/gaps/bytes", "bytes of the file");
+    auto* const gap_lost = integer("/gaps/bone_lost", "0 or 1");
+    auto* const note_time = real("/notes/time_s", "s");
+    auto* const note_tick = integer("/notes/tick", "1");
+    auto* const note_kind = text("/notes/kind");
+    auto* const note_json = text("/notes/json");
+    std::int64_t changes = 0;
+    while (const SessionPart* const p = rows.next()) {
+      for (const TickRecord& t : p->ticks) {
+        time->add(rows.seconds(t.tick));
+        for (const Field& c : tick_columns) {
+          const double value = value_of(*c.field, &t);
+          c.real != nullptr ? c.real->add(value) : c.integer->add(static_cast<std::int64_t>(value));
+        }
+        lost->add(static_cast<std::int64_t>(rows.lost_before(t)));
+      }
+      for (const SceneAction& a : p->actions) {
+        action_time->add(rows.seconds(a.tick));
+        for (const Field& c : action_columns) {
+          const double value = value_of(*c.field, &a);
+          if (c.text != nullptr)
+            c.text->add(rows.action_name(a));
+          else if (c.real != nullptr)
+            c.real->add(value);
+          else if (told(*c.field) == Told::nobody_or_number)
+            c.integer->add(who(*c.field, a) ? static_cast<std::int64_t>(value) : -1);
+          else
+            c.integer->add(static_cast<std::int64_t>(value));
+        }
+        before->add(changes);
+      }
+      for (const VoxelChange& c : p->changes) {
+        voxels.add(c.voxel);
+        densities.add(c.density);
+        ++changes;
+      }
+      if (const Gap* const g = p->gap) {
+        gap_first->add(static_cast<std::int64_t>(g->first_tick));
+        gap_ticks->add(static_cast<std::int64_t>(g->ticks));
+        gap_bytes->add(static_cast<std::int64_t>(g->bytes));
+        gap_lost->add(g->bone_lost ? 1 : 0);
+      }
+      for (const Note& n : p->notes) {
+        note_time->add(rows.seconds(n.tick));
+        note_tick->add(static_cast<std::int64_t>(n.tick));
+        note_kind->add(n.kind);
+        note_json->add(n.json);
+      }
+    }
+    for (auto& c : doubles) c.flush();
+    for (auto& c : whole) c.flush();
+    for (auto& c : texts) c.flush();
+    voxels.flush();
+    densities.flush();
   }
-  integers("/ticks/ticks_lost_before", "ticks", s.ticks.size(), [&](std::size_t i) { return lost_before(s, i); });
-
-  file.group("/voxel_changes");
-  std::vector<std::uint32_t> voxels;
-  std::vector<float> densities;
-  for (const VoxelChange& c : s.changes) {
-    voxels.push_back(c.voxel);
-    densities.push_back(c.density);
-  }
-  file.column("/voxel_changes/voxel", voxels, H5T_NATIVE_UINT32, "name");
-  file.column("/voxel_changes/density", densities, H5T_NATIVE_FLOAT, "share of a voxel");
-
-  file.group("/actions");
-  const std::size_t n = s.actions.size();
-  const auto action = [&](std::size_t i) -> const SceneAction& { return s.actions[i].action; };
-  const auto or_none = [](std::uint32_t id) { return id == SceneAction::kNobody ? std::int64_t{-1} : std::int64_t{id}; };
-  numbers("/actions/time_s", "s", n, [&](std::size_t i) { return seconds_of(s, action(i).tick); });
-  integers("/actions/tick", "1", n, [&](std::size_t i) { return action(i).tick; });
-  std::vector<std::string> names;
-  for (const RecordedAction& r : s.actions) names.emplace_back(name_of(static_cast<ActionKind>(r.action.kind)));
-  file.column("/actions/action", names);
-  integers("/actions/piece", "number, -1: none or all", n, [&](std::size_t i) { return or_none(action(i).body); });
-  integers("/actions/second_piece", "number, -1: none", n, [&](std::size_t i) { return or_none(action(i).other); });
-  integers("/actions/item", "plate or fixture, -1: none", n, [&](std::size_t i) { return or_none(item_of(action(i))); });
-  for (std::size_t v = 0; v < SceneAction{}.values.size(); ++v)
-    numbers("/actions/value_" + std::to_string(v), "by action", n, [&](std::size_t i) { return action(i).values[v]; });
-  integers("/actions/voxel_changes_before", "rows of /voxel_changes", n, [&](std::size_t i) { return s.actions[i].changes_before; });
-
-  file.group("/gaps");
-  integers("/gaps/first_tick", "1", s.gaps.size(), [&](std::size_t i) { return s.gaps[i].first_tick; });
-  integers("/gaps/ticks", "ticks", s.gaps.size(), [&](std::size_t i) { return s.gaps[i].ticks; });
-  integers("/gaps/bytes", "bytes of the file", s.gaps.size(), [&](std::size_t i) { return s.gaps[i].bytes; });
-  integers("/gaps/bone_lost", "0 or 1", s.gaps.size(), [&](std::size_t i) { return s.gaps[i].bone_lost; });
   file.close();
 }
 
@@ -382,12 +495,13 @@ void hdf5(const Session& s, const fs::path& path, const Context& context) {
 
 std::vector<fs::path> export_files(const fs::path& path) {
   std::vector<fs::path> files{path};
-  if (lower_case(path.extension().string()) == ".csv")
-    files.push_back(path.parent_path() / (path.stem().string() + "-actions" + path.extension().string()));
+  if (lower_case(path.extension().string()) != ".csv") return files;
+  for (const char* const what : {"-actions", "-notes"})
+    files.push_back(path.parent_path() / (path.stem().string() + what + path.extension().string()));
   return files;
 }
 
-void export_session(const Session& s, const fs::path& path, const Context& context) {
+void export_session(const SessionReader& session, const fs::path& path, const Context& context) {
   const std::string ending = lower_case(path.extension().string());
   const auto streamed = [](const fs::path& file, auto&& fill) {
     write_atomically(file, [&](const fs::path& temporary) {
@@ -396,18 +510,23 @@ void export_session(const Session& s, const fs::path& path, const Context& conte
       out.close();
     });
   };
+  Rows rows(session, context);
   if (ending == ".csv") {
-    // Both are whole, and closed, before the first takes its name.
-    write_atomically(path, [&](const fs::path& temporary) {
-      OutFile out(temporary, path);
-      csv(s, out, context);
-      out.close();
-      streamed(export_files(path)[1], [&](OutFile& actions) { actions_csv(s, actions); });
+    // All are whole, and closed, before the first takes its name.
+    const auto files = export_files(path);
+    streamed(files[0], [&](OutFile& ticks) {
+      streamed(files[1], [&](OutFile& actions) {
+        streamed(files[2], [&](OutFile& notes) {
+          csv(std::move(rows), ticks, actions, notes);
+          ticks.close();
+          actions.close();
+        });
+      });
     });
   } else if (ending == ".mcap") {
-    streamed(path, [&](OutFile& out) { mcap(s, out, context); });
+    streamed(path, [&](OutFile& out) { mcap(std::move(rows), out); });
   } else if (ending == ".h5" || ending == ".hdf5") {
-    write_atomically(path, [&](const fs::path& temporary) { hdf5(s, temporary, context); });
+    write_atomically(path, [&](const fs::path& temporary) { hdf5(std::move(rows), temporary); });
   } else {
     throw Error(ExitCode::usage, "'" + path.string() + "': sessions are exported as .csv, .h5 or .mcap");
   }

@@ -4,27 +4,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <new>
 
 #include "backlog.h"
 
 namespace osteo {
-namespace {
-
-// Whether it matters which densities it finds: all others may as well find those of a little later.
-bool looks_at_bone(const SceneAction& a) {
-  constexpr ActionKind kOthers[] = {ActionKind::hold,    ActionKind::resume,   ActionKind::move, ActionKind::grip,
-                                    ActionKind::suction, ActionKind::irrigate, ActionKind::yield};
-  return std::none_of(std::begin(kOthers), std::end(kOthers), [&](ActionKind k) { return a.is(k); });
-}
-
-}  // namespace
-
 Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, const SessionHeader& header, std::size_t most_waiting_bytes)
     : reader_(reader),
       backlog_(new Backlog(std::move(sink))),
       writer_(std::unique_ptr<SessionSink>(backlog_), header),
       most_waiting_(most_waiting_bytes),
+      frame_ticks_(std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(kFrameS * header.rate_hz)))),
       ticks_buffer_(256),
       changes_buffer_(1 << 20) {}
 
@@ -84,7 +75,6 @@ std::size_t Recorder::drain() {
     for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) guarded([&] { actions_.push_back(a); });
     total += n;
     guarded([&] { take(n, got); });
-    taken_ = next_tick_;
   }
 }
 
@@ -97,6 +87,10 @@ void Recorder::take(std::size_t n, std::size_t got) {
   };
   for (std::size_t t = 0; t < n; ++t) {
     const TickRecord& r = ticks_buffer_[t];
+    if (frame_of(r.tick) != frame_of(next_tick_ == 0 ? 0 : next_tick_ - 1)) {
+      put_up_to(t);
+      end_frame();
+    }
     // What the ring had no room for.
     if (r.tick > next_tick_) {
       put_up_to(t);
@@ -122,7 +116,9 @@ void Recorder::put(std::size_t begin, std::size_t end, std::span<const VoxelChan
   const std::size_t waiting = backlog_->waiting_bytes();
   if (gap_ && waiting <= most_waiting_ / 2) close_gap();
   if (!gap_ && waiting <= most_waiting_) {
-    writer_.append({ticks_buffer_.data() + begin, end - begin}, changes);
+    frame_.ticks.insert(frame_.ticks.end(), ticks_buffer_.begin() + static_cast<std::ptrdiff_t>(begin),
+                        ticks_buffer_.begin() + static_cast<std::ptrdiff_t>(end));
+    frame_.changes.insert(frame_.changes.end(), changes.begin(), changes.end());
     return;
   }
   lose(ticks_buffer_[begin].tick, end - begin, false);
@@ -132,24 +128,55 @@ void Recorder::put(std::size_t begin, std::size_t end, std::span<const VoxelChan
 
 void Recorder::put(const SceneAction& action) {
   if (!gap_) {
-    writer_.append(action);
+    // A frame keeps the last change of each voxel, and its actions before all of them.
+    if (parts_changes(row_of(action)) && !frame_.changes.empty()) end_frame();
+    frame_.actions.push_back(action);
     return;
   }
   Meanwhile& now = meanwhile();
   now.actions.push_back(action);
-  now.ends = looks_at_bone(action);
+  now.ends = parts_changes(row_of(action));  // all others may as well find the densities of a little later
 }
 
-// What comes now belongs behind an action that looks at bone.
+void Recorder::end_frame() {
+  if (gap_) {  // nothing is in the frame; notes wait
+    taken_ = next_tick_;
+    return;
+  }
+  {
+    const std::lock_guard lock(notes_mutex_);
+    frame_.notes.swap(notes_);
+  }
+  writer_.append(frame_);
+  frame_.actions.clear();
+  frame_.ticks.clear();
+  frame_.changes.clear();
+  frame_.notes.clear();
+  taken_ = next_tick_;
+}
+
+void Recorder::note(Note note) {
+  const std::lock_guard lock(notes_mutex_);
+  if (notes_.size() >= kMostNotes || note.json.size() > kLongestNote || stopped_notes_) {
+    ++notes_lost_;
+  } else {
+    notes_.push_back(std::move(note));
+  }
+}
+
+// What comes now belongs behind an action that parts changes.
 Recorder::Meanwhile& Recorder::meanwhile() {
   if (meanwhile_.empty() || meanwhile_.back().ends) meanwhile_.emplace_back();
   return meanwhile_.back();
 }
 
 void Recorder::lose(std::uint64_t first_tick, std::uint64_t ticks, bool bone) {
-  if (!gap_) gap_ = RecordingGap{first_tick, 0, 0};
+  if (!gap_) {
+    end_frame();
+    gap_ = RecordingGap{first_tick, 0, false};
+  }
   gap_->ticks += ticks;
-  if (bone) gap_->bone_lost = 1;
+  gap_->bone_lost |= bone;
   ticks_lost_ += ticks;
 }
 
@@ -157,12 +184,13 @@ void Recorder::close_gap() {
   writer_.append(*gap_);
   gaps_.push_back(*gap_);
   gap_.reset();
-  std::vector<VoxelChange> changes;
-  for (const Meanwhile& m : std::exchange(meanwhile_, {})) {
-    changes.clear();
-    for (const auto& [voxel, density] : m.changes) changes.push_back({voxel, density});
-    if (!changes.empty()) writer_.append({}, changes);
-    for (const SceneAction& a : m.actions) writer_.append(a);
+  for (Meanwhile& m : std::exchange(meanwhile_, {})) {
+    SessionBatch before;
+    for (const auto& [voxel, density] : m.changes) before.changes.push_back({voxel, density});
+    writer_.append(before);
+    SessionBatch then;
+    then.actions = std::move(m.actions);
+    writer_.append(then);
   }
 }
 
@@ -177,6 +205,11 @@ void Recorder::stop() {
     for (SceneAction a; reader_.actions.pop({&a, 1}) == 1;) actions_.push_back(a);
     for (; !actions_.empty(); actions_.pop_front()) put(actions_.front());
     if (gap_) close_gap();
+    {
+      const std::lock_guard lock(notes_mutex_);
+      stopped_notes_ = true;
+    }
+    end_frame();
   });
 }
 
@@ -189,14 +222,15 @@ void Recorder::finish(const SessionEnd& given, const std::function<void(std::vec
       lose(next_tick_, given.ticks - next_tick_, true);
       close_gap();
     }
-    const bool lost = std::any_of(gaps_.begin(), gaps_.end(), [](const RecordingGap& g) { return g.bone_lost != 0; });
+    const bool lost = std::any_of(gaps_.begin(), gaps_.end(), [](const RecordingGap& g) { return g.bone_lost; });
     if (lost && bone) {
-      std::vector<VoxelChange> all;
-      bone(all);
-      writer_.append({}, all);
+      SessionBatch all;
+      bone(all.changes);
+      writer_.append(all);
     }
     SessionEnd end = given;
     end.ticks_lost = ticks_lost_;
+    end.notes_lost = notes_lost_;
     writer_.finish(end);
   });
 }
@@ -205,6 +239,7 @@ Recorder::Status Recorder::status() const {
   Status s;
   s.ticks = taken_;  // first: what it says is waiting, or written
   s.ticks_lost = ticks_lost_;
+  s.notes_lost = notes_lost_;
   s.behind_s = backlog_->behind_s();
   s.waiting_bytes = backlog_->waiting_bytes();
   s.failure = backlog_->failure();

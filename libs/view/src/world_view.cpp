@@ -53,14 +53,14 @@ WorldView::~WorldView() {
   }
 }
 
-void WorldView::update(const World& world, Follower& follower) {
+void WorldView::update(const World& world, SceneReaders& readers) {
   std::erase_if(bodies_, [&](const auto& b) { return world.find(b.first) == nullptr; });
   for (const PlacedBody& placed : world.bodies()) {
     const std::uint32_t id = placed.body->id;
-    const LiveSurface* const surface = follower.surface(id);
+    const LiveSurface* const surface = readers.surface ? readers.surface->surface(id) : nullptr;
     if (surface == nullptr) continue;
     auto& view = bodies_[id];
-    const auto changed = follower.take_changed_bricks(id);
+    const auto changed = readers.surface->take_changed_bricks(id);
     if (!view) {
       // What is at risk goes with the first body, and the finer part of it.
       const bool patient = id == world.bodies().front().body->id || placed.of_region;
@@ -94,9 +94,9 @@ void WorldView::update(const World& world, Follower& follower) {
     shown(p.actor, model.mesh, pose);
     if (!model.moving.triangles.empty()) shown(p.moving, model.moving, pose * RigidTransform{{}, {f.opening_mm, 0, 0}});
   }
-  if (follower.dust() != nullptr) {
+  if (readers.dust) {
     if (!dust_) dust_ = std::make_unique<DustView>(renderer_, world.bodies().front().body->bone.frame().spacing_mm.x);
-    dust_->update(*follower.dust());
+    dust_->update(readers.dust->dust());
   }
 }
 
@@ -207,13 +207,13 @@ void WorldView::rest(int width, int height) {
   });
 }
 
-Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& p, SoftBody* soft) {
+Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p, SoftBody* soft) {
   OffscreenWindow window(p.width, p.height);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);
   set_up_scene(renderer);
   WorldView view(renderer, structures);
-  view.update(world, follower);
+  view.update(world, readers);
   if (soft != nullptr) view.update_soft(*soft);
   look_at(renderer, p.centre_mm, p.radius_mm, p.eye);
   return window.render();

@@ -52,7 +52,7 @@ void CutsPanel::draw(Rehearsal& rehearsal, int tool, Box box) {
   };
   std::vector<Part> parts;
   if (redraw) {
-    rehearsal.look([&](const World& world, Follower&) {
+    rehearsal.look([&](const World& world, SceneReaders&) {
       for (const PlacedBody& b : world.bodies()) parts.push_back({b.body, b.world_from_body.inverse()});
     });
   }

@@ -29,6 +29,7 @@ enum class Command {
   perform,
   undo,
   put_away,
+  mark,
   screenshot,
   save,
   reset,

@@ -24,8 +24,10 @@
 #include <cmath>
 #include <cstdio>
 #include <new>
+#include <numbers>
 #include <optional>
 
+#include "camera_notes.h"
 #include "cuts_panel.h"
 #include "gamepad.h"
 #include "help_panel.h"
@@ -149,8 +151,8 @@ class RehearsalWindow {
     Rehearsal& rehearsal = *actions_.rehearsal();
     world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
     Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    rehearsal.look([&](const World& world, Follower& follower) {
-      world_view_->update(world, follower);
+    rehearsal.look([&](const World& world, SceneReaders& readers) {
+      world_view_->update(world, readers);
       const BrickGrid& bone = world.bodies().front().body->bone;
       for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
         const Ijk o = bone.brick_coordinate(b);
@@ -278,7 +280,7 @@ class RehearsalWindow {
     const auto drill = static_cast<std::size_t>(tool_);
     ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
     std::optional<FreeWays> ways;
-    rehearsal.look([&](const World& world, Follower&) { ways.emplace(world, std::move(skin)); });
+    rehearsal.look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin)); });
     return *std::move(ways);
   }
 
@@ -331,7 +333,7 @@ class RehearsalWindow {
     // The bone under the mouse: a ray through the live voxels.
     const Vec3 eye = view_axes().eye_mm, forward = normalized(unproject(x, y, centre_) - eye);
     std::optional<BoneHit> hit;
-    rehearsal.look([&](const World& world, Follower&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
+    rehearsal.look([&](const World& world, SceneReaders&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
     if (!hit) {
       say("no bone under the mouse");
       return;
@@ -468,8 +470,8 @@ class RehearsalWindow {
     Rehearsal& now = *actions_.rehearsal();
     cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) draw_help(show_help_, width_);
-    now.look([&](const World& world, Follower& follower) {
-      world_view_->update(world, follower);
+    now.look([&](const World& world, SceneReaders& readers) {
+      world_view_->update(world, readers);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
     });
     world_view_->highlight(tools_->piece());
@@ -477,6 +479,16 @@ class RehearsalWindow {
     place_tool(tick);
     tools_->show(tick);
     wash(now, tick);
+    note_camera(now);
+  }
+
+  void note_camera(Rehearsal& rehearsal) {
+    vtkCamera* const camera = renderer_->GetActiveCamera();
+    const auto vec = [](const double* v) { return Vec3{v[0], v[1], v[2]}; };
+    CameraView view{vec(camera->GetPosition()), vec(camera->GetFocalPoint()), vec(camera->GetViewUp()), camera->GetViewAngle(), 0};
+    view.pixels_per_mm = height_ / (2 * camera->GetDistance() * std::tan(view.view_angle_deg * std::numbers::pi / 360));
+    const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    if (const auto note = camera_notes_.next(view, now_s, &rehearsal)) rehearsal.note("camera", *note);
   }
 
   void end_picture() {
@@ -685,6 +697,10 @@ class RehearsalWindow {
       case Command::taper:
         set_shape(BurrShape::taper);
         break;
+      case Command::mark:
+        rehearsal.note("mark", "{}");
+        say("marked");
+        break;
       case Command::screenshot:
         screenshot_wanted_ = true;
         break;
@@ -837,7 +853,7 @@ class RehearsalWindow {
     if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !failure_) {
       state.tick = rehearsal->latest();
       state.removed_mm3 = rehearsal->removed_mm3();
-      rehearsal->look([&](const World& world, Follower&) {
+      rehearsal->look([&](const World& world, SceneReaders&) {
         state.bodies = world.bodies().size();
         state.fixtures = world.fixtures().size();
         state.undo_steps = world.undo_steps();
@@ -872,6 +888,7 @@ class RehearsalWindow {
   int gl_errors_ = 0;
   std::uint64_t pictures_ = 0;
   bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false, in_hand_ = true;
+  CameraNotes camera_notes_;
   bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
   std::string message_;

@@ -125,7 +125,7 @@ void SceneTools::move_piece(Rehearsal& rehearsal, const RigidTransform& by) {
 
 void SceneTools::pick(Rehearsal& rehearsal, Vec3 from, Vec3 direction) {
   if (tool_ != Tool::piece) return;
-  rehearsal.look([&](const World& world, Follower&) {
+  rehearsal.look([&](const World& world, SceneReaders&) {
     const auto hit = bone_on_ray(world, from, direction, 10 * size_mm_ + length(from - handle_mm_));
     if (!hit) return;
     piece_ = hit->body;
@@ -141,7 +141,7 @@ void SceneTools::attach(Rehearsal& rehearsal) {
                                          normalized(from_floats(tick.device.axis)), grip_of(turn_deg_, tilt_deg_));
   std::vector<std::uint32_t> under;
   rehearsal.look(
-      [&](const World& world, Follower&) { under = bodies_under(world, plate_library()[static_cast<std::size_t>(plate_)], pose); });
+      [&](const World& world, SceneReaders&) { under = bodies_under(world, plate_library()[static_cast<std::size_t>(plate_)], pose); });
   if (under.empty()) {
     note_ = "no bone within 2 mm below the plate";
     return;
@@ -272,7 +272,7 @@ void SceneTools::panel(Rehearsal& rehearsal, const ViewAxes& view) {
   if (tool_ == Tool::plate) plate_panel(rehearsal);
   std::vector<Fixture> fixtures;
   std::size_t steps = 0;
-  rehearsal.look([&](const World& world, Follower&) {
+  rehearsal.look([&](const World& world, SceneReaders&) {
     fixtures = world.fixtures();
     steps = world.undo_steps();
   });

@@ -51,10 +51,11 @@ std::vector<SceneAction> everything() {
                    {901, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
                    {1000, SceneAction::open(2, 3)},
                    {1100, SceneAction::irrigate({4, 0, 5}, 5, 2)},
-                   {1200, SceneAction::plain(ActionKind::undo)},
+                   {1200, SceneAction::plain(ActionKind::undo)},  // what was drilled since the distractor was opened
                    {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
                    {1301, SceneAction::split(20)},
-                   {1400, SceneAction::plain(ActionKind::undo)},
+                   {1400, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split
+                   {1400, SceneAction::plain(ActionKind::undo)},  // and that
                    {1401, SceneAction::grip(mini)},
                    {1600, SceneAction::grip(SceneAction::kNobody)}});
 }
@@ -96,7 +97,7 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
       EXPECT_EQ(s.bodies, 2u);
       const Session session = read_session(file);
       EXPECT_GE(session.actions.size(), everything().size());
-      const ReplayResult again = replay(session, start.copy(), {}, {});
+      const ReplayResult again = replay(SessionReader(file), start.copy(), {}, {});
       EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
       EXPECT_TRUE(again.complete);
       EXPECT_EQ(again.bone_hash, s.bone_hash);
@@ -311,7 +312,7 @@ TEST(Rehearsal, TellsOfEveryStructureAndAReplayAgrees) {
   EXPECT_EQ(s.structures.at(9).ticks_touched, 0u);
   EXPECT_GT(s.structures.at(9).least_clearance_mm, 0.2);
   EXPECT_LT(s.structures.at(9).least_clearance_mm, 5);
-  const ReplayResult again = replay(session, world.copy(), anatomy, {});
+  const ReplayResult again = replay(SessionReader(options.session_file), world.copy(), anatomy, {});
   EXPECT_TRUE(again.identical) << again.difference;
   ASSERT_EQ(again.structures.size(), 2u);
   for (const auto& [value, e] : s.structures) {

@@ -10,6 +10,7 @@
 #include "osteo/base/error.h"
 #include "osteo/session/export.h"
 #include "osteo/session/recorder.h"
+#include "osteo/session/session_reader.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -51,13 +52,19 @@ TEST(Recorder, EndsWithASyncOfAllThatWasWritten) {
 
 // What was buffered goes to the disk last: that it does not fit is told then.
 TEST(Export, ADiskWithoutRoomIsToldByEveryFormat) {
-  Session session;
-  session.header = header();
-  for (std::uint64_t n = 0; n < 300; ++n) {
-    TickRecord t;
-    t.tick = n;
-    session.ticks.push_back(t);
+  const test::ScratchFolder recorded;
+  {
+    SessionWriter writer(recorded / "stream.oss", header());
+    SessionBatch batch;
+    for (std::uint64_t n = 0; n < 300; ++n) {
+      TickRecord t;
+      t.tick = n;
+      batch.ticks.push_back(t);
+    }
+    writer.append(batch);
+    writer.finish({300, "abc", "", 0, "", 0, 0});
   }
+  const SessionReader session(recorded / "stream.oss");
   for (const char* const name : {"out.csv", "out.h5", "out.mcap"}) {
     const test::ScratchFolder folder;
     const pid_t child = ::fork();

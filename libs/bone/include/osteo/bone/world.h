@@ -4,69 +4,27 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "osteo/bone/action.h"
 #include "osteo/bone/hardness.h"
 #include "osteo/bone/live_components.h"
 #include "osteo/bone/pieces.h"
-#include "osteo/bone/rigid_transform.h"
-#include "osteo/bone/saw.h"
 
 namespace osteo {
 
-/// What is done to a scene besides drilling.
-enum class ActionKind : std::uint32_t {
-  hold = 1,  ///< nothing may be removed until the next action: something is being prepared
-  resume,    ///< it may again
-  saw,       ///< take out a blade's width
-  split,     ///< take apart what does not hang together
-  move,      ///< put a piece somewhere, and all that is plated to it
-  grip,      ///< take a plate into the hand, turn it, or put it away
-  attach,    ///< fix a plate to one piece or two
-  detach,    ///< take a plate off
-  open,      ///< set the gap of a distractor
-  suction,   ///< a sucker at a place; rate 0: away
-  irrigate,  ///< water at a place; share 0: away
-  undo,      ///< take back the last saw, split, move, attach, detach or open
-  yield,     ///< what soft tissue pushes with near the tool, until the next of these
+/// A voxel's new density; the name is that of the stream (Body::name_of). Session files keep the two, not what it was before.
+struct VoxelChange {
+  VoxelKey voxel = 0;
+  float density = 0;
+  float before = 0;  ///< its density before this change
 };
-
-/// One of them, at the beginning of a tick, as it is written to session files. What follows from it follows from it and the scene alone.
-struct SceneAction {
-  static constexpr std::uint32_t kNobody = 0xffffffffU;
-  static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
-  static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
-
-  std::uint64_t tick = 0;
-  std::uint32_t kind = 0;         ///< ActionKind
-  std::uint32_t body = kNobody;   ///< id of a piece. saw: only this one, or all. attach: the one that the plate stays with
-  std::uint32_t other = kNobody;  ///< attach: the second piece, which a distractor moves
-  std::uint32_t item = 0;         ///< grip, attach: index in plate_library(), grip: or kNobody; detach, open: id of the fixture
-  std::array<double, 12> values{};
-
-  [[nodiscard]] bool is(ActionKind k) const { return kind == static_cast<std::uint32_t>(k); }
-  static SceneAction plain(ActionKind kind);                                ///< hold, resume, undo
-  static SceneAction saw(const SawCut& cut, std::uint32_t body = kNobody);  ///< in the world
-  static SceneAction split(double least_mm3);
-  static SceneAction move(std::uint32_t body, const RigidTransform& world_from_body);
-  static SceneAction grip(std::uint32_t plate, const RigidTransform& hand_from_plate = {});
-  static SceneAction attach(std::uint32_t plate, const RigidTransform& world_from_plate, std::uint32_t body, std::uint32_t other = kNobody);
-  static SceneAction detach(std::uint32_t fixture);
-  static SceneAction open(std::uint32_t fixture, double opening_mm);
-  static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
-  static SceneAction irrigate(Vec3 at_mm, double radius_mm, double share_per_s);
-  /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
-  static SceneAction yield(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
-  [[nodiscard]] SawCut saw_cut() const;
-  [[nodiscard]] RigidTransform transform() const;
-};
-static_assert(sizeof(SceneAction) == 120);
-
-/// "hold", "saw", ...; "?" for what is none.
-[[nodiscard]] std::string_view name_of(ActionKind kind);
+static_assert(sizeof(VoxelChange) == 12);
 
 /// A piece of bone and where it is. The grid never moves: a pose carries it into the world.
 struct Body {
@@ -113,13 +71,17 @@ class World {
   [[nodiscard]] const PlacedBody* find(std::uint32_t body) const;
   /// The body that a voxel of the stream belongs to; null when there is none.
   [[nodiscard]] const PlacedBody* owner(VoxelKey name) const;
-  /// The plate that the hand holds instead of the drill; kNobody: the drill. attach() leaves the hand empty.
-  [[nodiscard]] std::uint32_t plate_in_hand() const { return plate_; }
-  /// How: the hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
-  [[nodiscard]] const RigidTransform& grip() const { return grip_; }
+  /// A plate that a hand holds instead of its instrument.
+  struct Grip {
+    std::uint32_t plate = SceneAction::kNobody;  ///< index in plate_library(); kNobody: the instrument
+    /// The hand's frame has its origin at the device's position and z along its axis (frame_of_axis).
+    RigidTransform hand_from_plate;
+  };
+  /// `hand` below kMostHands. attach() leaves its hand without a plate.
+  [[nodiscard]] const Grip& grip(std::uint32_t hand = 0) const { return grips_[hand]; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
-  [[nodiscard]] std::size_t undo_steps() const { return done_.size(); }
+  [[nodiscard]] std::size_t undo_steps() const;
 
   struct Effect {
     bool done = true;
@@ -145,6 +107,17 @@ class World {
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
 
+  /// What the servo's stream tells, in its order, so that undo knows the strokes of the burr and which of them came before an action. Who
+  /// changes densities without a servo (from a session file) tells the same. A stroke goes from the first voxel changed to
+  /// ActionKind::stroke or to the next action that undo can take back, whichever comes first.
+  /// Memory: 12 bytes for each voxel of a stroke, and about 50 while it goes on; when strokes together need more than kMostStrokeBytes, the
+  /// oldest is forgotten, with all that came before it: undo goes back to there and no farther, and says so.
+  void tell(std::span<const VoxelChange> changes);
+  void tell(const SceneAction& action);
+  /// Changes or actions of the stream were missed: nothing that came before can be taken back any more, nor the stroke that goes on.
+  void forget();
+  static constexpr std::size_t kMostStrokeBytes = std::size_t{64} << 20;
+
   /// Of bodies, poses and fixtures; the bone's own hash where there is one body, unmoved, and nothing on it.
   [[nodiscard]] std::string hash() const;
   /// Density at a point of the world, of whichever body has the most there.
@@ -162,7 +135,8 @@ class World {
   // What it takes to go back: places and plates as they were; densities as differences, so that what was drilled since stays drilled.
   struct Done {
     ActionKind kind;
-    std::uint32_t of = 0;  // move: the piece; open: the fixture
+    std::uint32_t of = 0;         // move: the piece; open: the fixture
+    std::vector<Change> drilled;  // stroke: names; of the rest only this
     std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
     std::vector<Fixture> fixtures;
     std::vector<std::pair<std::uint32_t, std::vector<Change>>> sawn;
@@ -175,7 +149,8 @@ class World {
   [[nodiscard]] std::uint32_t not_under_plate(const SceneAction& attach) const;
   void move_group(const std::vector<std::uint32_t>& group, const RigidTransform& by);
   [[nodiscard]] Done snapshot(ActionKind kind, std::uint32_t of = 0) const;
-  void remember(Done done);
+  [[nodiscard]] static bool goes_on(const Done& before, const Done& after);
+  void end_stroke();
   Effect saw(const SceneAction& a);
   Effect split(const SceneAction& a, const ComponentsOf& components);
   Effect undo();
@@ -184,9 +159,15 @@ class World {
 
   std::vector<PlacedBody> bodies_;
   std::vector<Fixture> fixtures_;
+  // Actions are done before the stream tells of them: the first told_ of these it has told of, and strokes come in behind those.
   std::vector<Done> done_;
-  RigidTransform grip_;
-  std::uint32_t plate_ = SceneAction::kNobody;
+  std::size_t told_ = 0;
+  std::vector<Change> stroke_;  // that goes on, by names
+  std::unordered_map<VoxelKey, std::uint32_t> in_stroke_;
+  bool missed_ = false;  // since something was missed, nothing has come that surely begins a new step
+  std::size_t stroke_bytes_ = 0;
+  std::uint64_t steps_forgotten_ = 0;
+  std::array<Grip, kMostHands> grips_;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
   bool held_ = false;
 };

@@ -37,9 +37,9 @@ class HapticRenderer {
 
   /// From the next step on. The scene belongs to the caller and must live until another is shown. No allocation.
   void show(HapticScene* scene) noexcept { scene_ = scene; }
-  /// What soft tissue pushes with from now on (ActionKind::yield): a plane near the tool, made by whoever moves the tissue, felt at full
-  /// rate.
-  void feel(const SceneAction& yield) noexcept;
+  /// What soft tissue pushes with from now on (ActionKind::soft_push): a plane near the tool, made by whoever moves the tissue, felt at
+  /// full rate.
+  void feel(const SceneAction& push) noexcept;
   /// Nothing is removed while held.
   void hold(bool on) noexcept { held_ = on; }
 

@@ -1,6 +1,8 @@
 // The servo: the only writer of the live bone. One step a tick, the same for a device, a script and a replay.
 #pragma once
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include "osteo/haptics/device.h"
 #include "osteo/haptics/renderer.h"
@@ -19,7 +21,14 @@ class Servo {
  public:
   /// All must outlive the servo. `rate_hz` fixes the time step, whatever the clock does.
   Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz)
-      : renderer_(renderer), device_(device), stream_(stream), dt_s_(1 / rate_hz) {}
+      : renderer_(renderer),
+        device_(device),
+        stream_(stream),
+        dt_s_(1 / rate_hz),
+        pause_ticks_(static_cast<std::uint64_t>(std::max(1.0, std::round(kStrokePauseS * rate_hz)))) {}
+
+  /// A stroke of the burr ends when it has taken no bone for so long: the drill is off, or away from bone. ActionKind::stroke tells of it.
+  static constexpr double kStrokePauseS = 0.3;
 
   /// Take up what was posted, read the device, compute the force, remove bone, tell the readers. False when the device has ended.
   bool step(std::int64_t lateness_ns) noexcept;
@@ -43,7 +52,10 @@ class Servo {
   std::atomic<double> removed_mm3_{0};
   std::atomic<const Handover*> inbox_{nullptr};
   void take_up(std::uint64_t tick) noexcept;
+  void tell_stroke(std::uint64_t tick, bool removes) noexcept;
   Vec3 force_n_;
+  std::uint64_t pause_ticks_, last_removal_ = 0;
+  bool in_stroke_ = false;
 };
 
 }  // namespace osteo

@@ -1,8 +1,10 @@
 // The one stream of a rehearsal: what the servo tells every reader.
 #pragma once
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -65,48 +67,70 @@ struct TickRecord {
 };
 static_assert(sizeof(TickRecord) == 120);
 
-/// A voxel's new density; the name is that of the stream (Body::name_of).
-struct VoxelChange {
-  VoxelKey voxel;
-  float density;
-};
-static_assert(sizeof(VoxelChange) == 8);
-
 /// One reader's end of the stream. A tick record follows the actions and the changes of its tick.
 struct StreamReader {
   StreamReader(std::size_t tick_capacity, std::size_t change_capacity) : ticks(tick_capacity), changes(change_capacity) {}
+  static constexpr std::uint64_t kNone = ~std::uint64_t{0};
   Ring<TickRecord> ticks;
   Ring<VoxelChange> changes;
   Ring<SceneAction> actions{1 << 12};
+  /// The first tick it is told of, with the actions at its beginning or not; kNone until then. What comes before it was never meant for
+  /// this reader: it is not lost.
+  std::atomic<std::uint64_t> first_tick{kNone};
   /// Lost because the reader was too slow: ticks with their changes, and actions.
   std::atomic<std::uint64_t> dropped{0}, actions_dropped{0};
 };
 
-/// Readers are added before the servo starts.
+/// The servo's thread publishes; readers join and leave at any time, each from any one thread at a time. publish() takes no lock, waits for
+/// nobody and allocates nothing.
 class Stream {
  public:
-  StreamReader& add_reader(std::size_t tick_capacity = 1 << 13, std::size_t change_capacity = 1 << 21) {
-    readers_.push_back(std::make_unique<StreamReader>(tick_capacity, change_capacity));
-    return *readers_.back();
-  }
+  static constexpr std::size_t kMostReaders = 16;
+
+  Stream() = default;
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+  /// Told of what is published from now on; belongs to the stream until it leaves. Allocates: never in the servo. Error(resources) where
+  /// kMostReaders are there.
+  StreamReader& add_reader(std::size_t tick_capacity = 1 << 13, std::size_t change_capacity = 1 << 21);
+  /// Waits for the end of a publish() that may still use it (microseconds), then it is gone. Others notice nothing.
+  void remove_reader(StreamReader& reader);
+
   /// Before the tick at whose beginning it happened.
   void publish(const SceneAction& action) noexcept {
-    for (const auto& r : readers_) {
-      if (!r->actions.push(action)) r->actions_dropped.fetch_add(1, std::memory_order_relaxed);
-    }
+    for_each([&](StreamReader& r) {
+      if (!r.actions.push(action)) r.actions_dropped.fetch_add(1, std::memory_order_relaxed);
+    });
   }
   void publish(const TickRecord& tick, std::span<const VoxelChange> changes) noexcept {
-    for (const auto& r : readers_) {
+    for_each([&](StreamReader& r) {
+      if (r.first_tick.load(std::memory_order_relaxed) == StreamReader::kNone) r.first_tick.store(tick.tick, std::memory_order_relaxed);
       // Both or neither: a reader pairs changes with ticks by their counts.
-      if (r->ticks.room() < 1 || !r->changes.push(changes)) {
-        r->dropped.fetch_add(1, std::memory_order_relaxed);
+      if (r.ticks.room() < 1 || !r.changes.push(changes)) {
+        r.dropped.fetch_add(1, std::memory_order_relaxed);
       } else {
-        r->ticks.push(tick);
+        r.ticks.push(tick);
       }
-    }
+    });
   }
 
  private:
+  // Odd while it runs. Who leaves empties its slot and then looks at this number, the servo raises it and then looks at the slots: in one
+  // order of all four (sequential consistency) either the servo finds the slot empty or the leaver finds the number odd, and waits.
+  template <class F>
+  void for_each(F&& f) noexcept {
+    const std::uint64_t n = publishes_.load(std::memory_order_relaxed);
+    publishes_.store(n + 1, std::memory_order_seq_cst);
+    for (const auto& slot : slots_) {
+      if (StreamReader* const r = slot.load(std::memory_order_seq_cst)) f(*r);
+    }
+    publishes_.store(n + 2, std::memory_order_release);
+  }
+
+  std::array<std::atomic<StreamReader*>, kMostReaders> slots_{};
+  std::atomic<std::uint64_t> publishes_{0};
+  std::mutex mutex_;  // of those who join and leave, among themselves
   std::vector<std::unique_ptr<StreamReader>> readers_;
 };
 

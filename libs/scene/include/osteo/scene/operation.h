@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "osteo/haptics/servo.h"
+#include "osteo/scene/stroke_reader.h"
 
 namespace osteo {
 
@@ -23,10 +24,15 @@ class Operation {
   [[nodiscard]] double removed_mm3() const { return servo_.removed_mm3(); }
   [[nodiscard]] const World& world() const { return world_; }
   [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
+  /// To be told of the stream by whoever acts, in the same thread; without it undo knows nothing of the burr's strokes.
+  [[nodiscard]] Reader& strokes() { return strokes_; }
+  /// The servo has taken up all that was done.
+  [[nodiscard]] bool taken() const noexcept { return servo_.taken(); }
 
-  /// Called when something was done and the servo does not know it yet: bodies that are new are still as they were made.
+  /// Called when the world was changed (ActionRow::changes_world) and the servo does not know it yet: bodies that are new are still as they
+  /// were made.
   using Done = std::function<void(const World::Effect&)>;
-  /// In the thread that also steps; at most one action a tick.
+  /// In the thread that also steps; at most one action a tick. Who drains strokes() does so before.
   World::Effect act(const SceneAction& action, const Done& done = {}, const World::ComponentsOf& components = {});
   /// In one other thread, while the servo runs by the clock. `running` false: the servo has ended, and nothing is waited for; none when it
   /// did before the action was tried. `held`: called while nothing is removed and before anything changes, for those that have to be up to
@@ -38,6 +44,7 @@ class Operation {
   void hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene);
 
   World world_;
+  StrokeReader strokes_{world_};
   HapticRenderer renderer_;
   Servo servo_;
   std::unique_ptr<HapticScene> scene_, old_scene_;

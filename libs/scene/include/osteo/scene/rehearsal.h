@@ -9,13 +9,15 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "osteo/rt/loop.h"
-#include "osteo/scene/follower.h"
 #include "osteo/scene/operation.h"
+#include "osteo/scene/scene_readers.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
+#include "osteo/session/session_reader.h"
 
 namespace osteo {
 
@@ -24,7 +26,7 @@ struct RehearsalOptions {
   HapticSetup haptics;
   Anatomy anatomy;                     ///< hardness where haptics.hardness is set; structures at risk where the case has them
   std::filesystem::path session_file;  ///< empty: not recorded
-  FollowerParts follow;                ///< what is kept up beside the servo
+  ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
   std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
 };
@@ -46,6 +48,7 @@ struct RehearsalSummary {
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
+  std::uint64_t notes_not_recorded = 0;
   std::uint64_t ticks_not_followed =
       0;                     ///< surface and pieces caught up with them from the bone itself; dust lies a little elsewhere than in a replay
   bool interrupted = false;  ///< run_to_end() was asked to stop
@@ -53,8 +56,9 @@ struct RehearsalSummary {
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
   double voxel_mm3 = 0;                                 ///< turns the mass of a piece into a volume
-  std::vector<LiveComponents::Component> pieces;  ///< of at least Follower::kLeastPieceMm3, largest first; empty unless they were followed
-  std::size_t bodies = 1;                         ///< that move on their own
+  std::vector<LiveComponents::Component>
+      pieces;              ///< of at least PiecesReader::kLeastPieceMm3, largest first; empty unless they were followed
+  std::size_t bodies = 1;  ///< that move on their own
   std::vector<Fixture> fixtures;
   std::optional<LoopStats> loop;      ///< only when it ran by the clock
   std::vector<std::string> warnings;  ///< what makes it less true than it looks, and what to do about it
@@ -65,8 +69,8 @@ struct RehearsalSummary {
   }
 };
 
-/// Owns the world while it runs. The servo thread writes densities; the recorder, the follower and whoever asks for a reader are told
-/// through the stream; the follower's thread changes the scene.
+/// Owns the world while it runs. The servo's thread writes densities; the recorder and the readers are told through the stream; the
+/// follower's thread drains it for all readers and changes the scene. Who holds which lock: docs/threads.md.
 class Rehearsal {
  public:
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
@@ -86,6 +90,8 @@ class Rehearsal {
 
   /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
   void act(const SceneAction& action);
+  /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
+  void note(const std::string& kind, const std::string& json);
   /// Why the last action that could not be done was not; once.
   std::string take_refusal();
 
@@ -101,7 +107,7 @@ class Rehearsal {
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
   [[nodiscard]] bool realtime() const { return loop_ && loop_->realtime(); }
-  /// Parts that hang together, of at least Follower::kLeastPieceMm3, as last seen; 0 unless they are followed.
+  /// Parts that hang together, of at least PiecesReader::kLeastPieceMm3, as last seen; 0 unless they are followed.
   [[nodiscard]] int pieces() const { return pieces_; }
   /// Null where the scene has none.
   [[nodiscard]] const StructureMap* structures() const { return options_.anatomy.structures.get(); }
@@ -113,7 +119,15 @@ class Rehearsal {
   /// Null where the scene has none; under look() only.
   [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
-  void look(const std::function<void(const World&, Follower&)>& f);
+  void look(const std::function<void(const World&, SceneReaders&)>& f);
+
+  /// From any thread but a reader's own calls, before it starts or while it runs: from now on the follower's thread calls it, first
+  /// resync() with the scene as it is. It must live until remove_reader() has returned, or as long as this. Waits for the lock of look().
+  void add_reader(Reader& reader);
+  /// When it returns, the reader is not called any more.
+  void remove_reader(Reader& reader);
+  /// For whoever reads in a thread of its own, and does not hold up the others then: Stream::add_reader().
+  [[nodiscard]] Stream& stream() { return stream_; }
 
  private:
   void follow();
@@ -129,14 +143,14 @@ class Rehearsal {
   double voxel_mm3_, finest_voxel_mm_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
-  StreamReader* reader_ = nullptr;
   Operation operation_;
+  ReaderHub hub_;
   Seqlock<TickRecord> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
-  std::mutex mutex_;  // of world and follower
-  std::unique_ptr<Follower> follower_;
+  std::mutex mutex_;  // of world and readers
+  std::unique_ptr<SceneReaders> readers_;
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
@@ -157,7 +171,8 @@ struct ReplayResult {
   std::vector<std::string> losses;  ///< what the session lacks; see losses()
   bool complete = false;            ///< the session was closed properly
   bool identical = false;  ///< every tick that could be repeated, and (when complete) bone, surface and dust, came out bit for bit the same
-  std::string difference;  ///< the first one
+  std::string difference;  ///< the first one, and between which checkpoints it came
+  std::optional<double> difference_since_s;  ///< the last checkpoint where all was the same; 0: the beginning
   std::string bone_hash, surface_hash, dust_hash;
   std::map<std::uint32_t, StructureEvents> structures;  ///< as the session's summary has them
   std::shared_ptr<const World> world;                   ///< as the session left it
@@ -165,12 +180,17 @@ struct ReplayResult {
   double seconds = 0;
 };
 
-/// Runs the recorded poses and actions through the same servo. `start` and `anatomy` as the session had them: Error(corrupt), Error(usage)
-/// when they are not.
-[[nodiscard]] ReplayResult replay(const Session& session, World start, const Anatomy& anatomy, const Context& context);
-/// Applies the changes and actions of a session, in their order, to the world it began with; up to a gap where one is given.
-/// Error(corrupt).
-void apply_recorded(const Session& session, World& world, const Gap* until = nullptr);
+/// Runs the recorded poses and actions through the same servo, a frame at a time: memory does not grow with the session. At each checkpoint
+/// the scene is compared three ways: by poses, by changes, by checkpoints. `start` and `anatomy` as the session had them: Error(corrupt),
+/// Error(usage) when they are not; Error(corrupt) also where this build's servo cannot repeat it (SessionOutline::not_replayable).
+/// `readers` are told as they would have been while it was recorded, up to the first gap: resync() with the scene it began with, then every
+/// action and tick. A score needs no more than to be one.
+[[nodiscard]] ReplayResult replay(const SessionReader& session, World start, const Anatomy& anatomy, const Context& context,
+                                  std::span<Reader* const> readers = {});
+/// Applies the changes and actions of a session, in their order, to the world it began with. Error(corrupt).
+void apply_recorded(const SessionReader& session, World& world);
+/// The same up to a tick, by way of the checkpoints: the tick that it gives the scene of (SessionReader::scene_at). Error(corrupt).
+std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick);
 
 /// What speaks against a script for this scene, each in a sentence: strokes that stay far from bone, points that look like metres, a sucker
 /// or water where there is no dust.

@@ -33,6 +33,11 @@ struct SessionFolder {
 /// Error(corrupt) when it is damaged.
 [[nodiscard]] World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context);
 
+/// The scene at a time of a session, in seconds from its beginning; exact to the tenth of a second that holds it. Error(corrupt) when it is
+/// damaged, or what came before is not all known.
+[[nodiscard]] World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy,
+                             const Context& context);
+
 /// Settings from `file`, or where that is empty from haptics.json of the case where there is one.
 void apply_haptic_settings(const std::filesystem::path& case_folder, const std::filesystem::path& file, HapticSetup& setup);
 /// What the case knows besides bone, as the setup asks for it. Settles in the setup whether removal goes by HU and by which law, and names

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "osteo/data/data.h"
-#include "osteo/scene/follower.h"
+#include "osteo/scene/scene_readers.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/dust_view.h"
@@ -23,7 +23,7 @@ class WorldView {
   WorldView& operator=(const WorldView&) = delete;
 
   /// Shows the scene as it is; after the first time only what changed is made again.
-  void update(const World& world, Follower& follower);
+  void update(const World& world, SceneReaders& readers);
   /// Soft tissue as it is now; under the lock that keeps it still.
   void update_soft(SoftBody& soft);
   /// One body stands out; kNobody: none.
@@ -67,7 +67,7 @@ struct WorldPicture {
   int width = 900, height = 700;
 };
 /// Works without a display. Error(failed) when there is no OpenGL.
-[[nodiscard]] Picture draw_world(const World& world, Follower& follower, const StructureMap* structures, const WorldPicture& picture,
+[[nodiscard]] Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& picture,
                                  SoftBody* soft = nullptr);
 
 }  // namespace osteo

@@ -1,0 +1,35 @@
+// The readers that a scene may list.
+#pragma once
+#include <memory>
+
+#include "osteo/scene/dust_reader.h"
+#include "osteo/scene/pieces_reader.h"
+#include "osteo/scene/surface_reader.h"
+#include "osteo/scene/tool_counts.h"
+
+namespace osteo {
+
+struct ReaderList {
+  bool surface = true;
+  bool pieces = false;
+  bool dust = false;
+};
+
+/// What is not listed is null, and costs nothing.
+struct SceneReaders {
+  std::unique_ptr<SurfaceReader> surface;
+  std::unique_ptr<PiecesReader> pieces;
+  std::unique_ptr<DustReader> dust;
+  ToolCounts tools;
+
+  /// For this scene as it is.
+  SceneReaders(const World& world, const ReaderList& list, double rate_hz, const Context& context);
+  /// All of them, which are of the hub's scene as it is.
+  void add_to(ReaderHub& hub);
+  /// Empty where the surface is not listed.
+  [[nodiscard]] std::string surface_hash() const { return surface ? surface->hash() : std::string(); }
+  /// Empty where pieces are not listed.
+  [[nodiscard]] std::vector<LiveComponents::Component> large_pieces() const;
+};
+
+}  // namespace osteo
