@@ -763,6 +763,7 @@ class RehearsalWindow {
   void say(const std::string& text) {
     message_ = text;
     message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+    if (Rehearsal* const rehearsal = actions_.rehearsal()) rehearsal->note("message", text);
   }
 
   void panel(Rehearsal& rehearsal) {
