@@ -287,7 +287,7 @@ void bench_kernel(const Context& context) {
           const Vec3 turn{0, 4 * std::sin(5 * s), 4 * std::cos(5 * s)};
           goal.position_mm = real ? place + turn + Vec3{-1 - 0.3 * s, 0, 0} : place + Vec3{turn.y, turn.z, -1 - 0.3 * s};
           goal.axis = {0.6F, 0, 0.8F};
-          goal.drill_on = 1;
+          goal.pedal = 255;
           goal.tool = 5;
           const DeviceSample sample = hand.step(goal, 1e-3, force);
           const auto begin = std::chrono::steady_clock::now();
@@ -439,7 +439,7 @@ void bench_real_time() {
       HapticSetup setup;
       setup.device = SpringHand::traits();
       HapticRenderer renderer(setup, bone, {}, 1 / hz);
-      Script script;
+      Strokes script;
       script.tool = 5;
       script.axis = {0.6, 0, 0.8};
       for (int i = 0; i <= 100; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 3 - 0.04 * i}, true});
@@ -543,7 +543,7 @@ void bench_haptics_fuzz(const Context&) {
       DeviceSample s;
       s.position_mm = {static_cast<float>(x.x), static_cast<float>(x.y), static_cast<float>(x.z)};
       s.axis = {static_cast<float>(u(random)), static_cast<float>(u(random)), static_cast<float>(u(random))};
-      s.drill_on = random() % 50 == 0;
+      s.pedal = random() % 50 == 0 ? 255 : 0;
       s.tool = static_cast<std::uint8_t>(random() % 50);
       s.age_ms = dice > 990 ? static_cast<std::uint8_t>(random()) : 0;
       if (dice == 500) s.position_mm[random() % 3] = NAN;

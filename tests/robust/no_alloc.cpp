@@ -108,7 +108,7 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     HapticRenderer renderer(setup, bone, {hardness, nullptr, some_structures()}, 1e-3);
     Stream stream;
     auto& reader = stream.add_reader(1 << 14, 1 << 22);
-    Script script;
+    Strokes script;
     script.axis = {0.6, 0, 0.8};
     for (int i = 0; i <= 40; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 4 - 0.2 * i}, i % 5 != 0});
     ScriptedDevice device(script, 1000);

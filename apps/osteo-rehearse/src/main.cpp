@@ -97,7 +97,7 @@ class Sitting {
     }
     SessionFolder session{next_folder_, case_.folder, from_case ? std::filesystem::path() : last_};
     World world = world_at_begin(session, case_, options_.anatomy, io_.context);
-    const HandPose pose = FreeWays(world, skin_of_burr(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+    const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
     const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
     auto device = hands_.make(start, near_the_bone(world, start));
     options_.haptics.device = device->traits();

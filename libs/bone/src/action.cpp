@@ -126,7 +126,9 @@ constexpr std::array<ActionRow, kLast> kTable{{
     {.kind = ActionKind::setting,
      .name = "setting",
      .help = "one of the haptic settings has another value from here on",
+     .changes_touch = true,
      .last_counts = true,
+     .ends_hold = true,
      .item = "number of the setting, as the session's header lists them",
      .values = kSetting},
 }};

@@ -66,7 +66,7 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
     goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
   const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
-  goal_.drill_on = (s.buttons & 1U) != 0 || (pressed & 1U) != 0 ? 1 : 0;
+  goal_.pedal = (s.buttons & 1U) != 0 || (pressed & 1U) != 0 ? 255 : 0;
   DeviceSample sample = hand_.step(goal_, dt_s, force_n);
   sample.buttons = static_cast<std::uint8_t>(s.buttons);
   // The cap at rest sends nothing, so silence is not a sign of an unplugged device; gone() says that.
@@ -139,7 +139,7 @@ DeviceSample WoodenHapticsDevice::read(std::uint64_t, double, Vec3) noexcept {
     silent_ = false;
   }
   s.axis = to_floats(normalized(map_.direction(last_pose_.axis)));
-  s.drill_on = last_pose_.button || (pressed & 1U) != 0 ? 1 : 0;
+  s.pedal = last_pose_.button || (pressed & 1U) != 0 ? 255 : 0;
   s.tool = tool_;
   return s;
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "osteo/base/files.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 
 namespace osteo {
 
@@ -129,9 +129,15 @@ void Follower::dust_tick(const TickRecord& tick, std::span<const VoxelChange> ch
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz_ / 100)));
   if (tick.tick % every != 0) return;
   const double seconds = static_cast<double>(every) / rate_hz_;
-  if (tick.device.tool < burr_library().size() && (tick.flags & kPlateInHand) == 0)
-    dust_->push(burr_library()[tick.device.tool].head(), from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
-                normalized(from_floats(tick.device.axis)));
+  if ((tick.flags & (kPlateInHand | kPoseInvalid)) == 0) {
+    const Instrument& held = instrument_of(tick.device.tool);
+    const Vec3 tip = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm);
+    const double amount = held.rate * seconds * tick.device.pedal / 255;
+    dust_->push(held.head, tip, normalized(from_floats(tick.device.axis)));
+    if (held.kind == InstrumentKind::sucker && amount > 0) dust_->suck(tip, held.reach_mm, amount);
+    if (held.kind == InstrumentKind::irrigator && amount > 0) dust_->irrigate(tip, held.reach_mm, std::min(1.0, amount));
+  }
+  if (tick.hand > 0) return;  // once for all hands
   const auto place = [](const SceneAction& a) { return Vec3{a.values[0], a.values[1], a.values[2]}; };
   if (sucker_.values[4] > 0) dust_->suck(place(sucker_), sucker_.values[3], sucker_.values[4] * seconds);
   if (water_.values[4] > 0) dust_->irrigate(place(water_), water_.values[3], std::min(1.0, water_.values[4] * seconds));
@@ -198,11 +204,12 @@ std::size_t Follower::drain(StreamReader& reader) {
     for (std::size_t t = 0; t < n; ++t) {
       const TickRecord& r = ticks_[t];
       wanted += r.voxels_changed;
-      ticks_lost_ += r.tick - next_tick_;
+      if (r.hand == 0) ticks_lost_ += r.tick - next_tick_;
       next_tick_ = r.tick + 1;
+      latest_[r.hand] = r;
       if (r.voxels_changed > 0) burrs_used_.insert(r.device.tool);
       ticks_without_room_ += (r.flags & kNoRoom) != 0 ? 1 : 0;
-      unusable_poses_ += (r.flags & kPoseInvalid) != 0 ? 1 : 0;
+      unusable_poses_ += (r.flags & kPoseInvalid) != 0 ? 1 : 0;  // of any hand
     }
     if (wanted > changes_.size()) changes_.resize(wanted);
     const std::size_t got = reader.changes.pop({changes_.data(), wanted});
@@ -222,7 +229,6 @@ std::size_t Follower::drain(StreamReader& reader) {
       if (f->surface) f->surface->mark(own);
       if (f->components) f->components->mark(own);
     }
-    latest_ = ticks_[n - 1];
     total += n;
   }
   if (total == 0) return 0;

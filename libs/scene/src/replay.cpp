@@ -58,16 +58,19 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   const std::span repeated(session.ticks.data(), gap ? gap->ticks_before : session.ticks.size());
   const auto actions_end = session.actions.begin() + static_cast<std::ptrdiff_t>(gap ? gap->actions_before : session.actions.size());
   result.losses = losses(session);
-  std::vector<DeviceSample> samples;
-  samples.reserve(repeated.size());
-  for (const TickRecord& t : repeated) samples.push_back(t.device);
+  const std::size_t hands = session.header.haptics.hands();
+  std::vector<std::vector<DeviceSample>> samples(hands);
+  for (const TickRecord& t : repeated) samples[t.hand].push_back(t.device);
   World from_changes = start.copy();  // the second way: apply the recorded changes
-  ReplayDevice device(std::move(samples));
+  std::vector<std::unique_ptr<ReplayDevice>> hand_devices;
+  std::vector<Device*> devices;
+  for (std::vector<DeviceSample>& of_hand : samples)
+    devices.push_back(hand_devices.emplace_back(std::make_unique<ReplayDevice>(std::move(of_hand))).get());
   Stream stream;
   StreamReader& reader = stream.add_reader();
   // Dust follows from the stream, so it has to come out the same as well.
   StreamReader* const dust_reader = session.header.dust ? &stream.add_reader() : nullptr;
-  Operation operation(std::move(start), session.header.haptics, anatomy, device, stream, session.header.rate_hz);
+  Operation operation(std::move(start), session.header.haptics, anatomy, devices, stream, session.header.rate_hz);
   std::unique_ptr<Follower> dust;
   if (dust_reader != nullptr)
     dust = std::make_unique<Follower>(operation.world(), FollowerParts{false, false, true}, session.header.rate_hz, context);
@@ -88,12 +91,14 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     ++next;
   };
   for (const TickRecord& recorded : repeated) {
-    if (recorded.tick % 256 == 0) {
-      context.progress(0.9 * static_cast<double>(recorded.tick) / static_cast<double>(repeated.size()), "replay");
-      if (dust) dust->drain(*dust_reader);
+    if (recorded.hand == 0) {
+      if (recorded.tick % 256 == 0) {
+        context.progress(0.9 * static_cast<double>(recorded.tick * hands) / static_cast<double>(repeated.size()), "replay");
+        if (dust) dust->drain(*dust_reader);
+      }
+      if (next != actions_end && next->action.tick == recorded.tick) act();
+      operation.step(0);
     }
-    if (next != actions_end && next->action.tick == recorded.tick) act();
-    operation.step(0);
     TickRecord now;
     reader.ticks.pop({&now, 1});
     while (reader.changes.pop(changes) > 0) {
@@ -103,12 +108,14 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
     // Bytes, not numbers: the same bits or not.
     constexpr std::size_t kRepeated = offsetof(TickRecord, work_us);
     const bool same = std::memcmp(&now, &recorded, kRepeated) == 0;
-    if (!same) differ("tick " + std::to_string(recorded.tick) + " came out differently");
+    if (!same)
+      differ("tick " + std::to_string(recorded.tick) + (hands > 1 ? ", hand " + std::to_string(recorded.hand) + "," : "") +
+             " came out differently");
     result.removed_mm3 += static_cast<double>(now.removed_mm3);
   }
   for (; next != actions_end; operation.finish()) act();  // done in the last moment
-  result.ticks = session.ticks.size();
-  result.ticks_repeated = repeated.size();
+  result.ticks = session.ticks.size() / hands;
+  result.ticks_repeated = repeated.size() / hands;
   result.actions = session.actions.size();
   result.structures = operation.renderer().structure_events();
   Applied done;
@@ -127,7 +134,7 @@ ReplayResult replay(const Session& session, World start, const Anatomy& anatomy,
   result.surface_hash = surfaces.surface_hash();
   if (dust && gap == nullptr) {
     dust->drain(*dust_reader);
-    dust->end(*dust_reader, repeated.size());
+    dust->end(*dust_reader, result.ticks_repeated);
     result.dust_hash = dust->dust()->hash();
   }
   result.complete = session.end.has_value();

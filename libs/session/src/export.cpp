@@ -14,7 +14,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 
 namespace osteo {
 namespace {
@@ -30,13 +30,14 @@ struct Column {
 };
 constexpr Column kColumns[] = {
     {"tick", "1", [](const TickRecord& t) { return static_cast<double>(t.tick); }, true},
+    {"hand", "number, from 0", [](const TickRecord& t) { return static_cast<double>(t.hand); }, true},
     {"x_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[0]); }, false},
     {"y_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[1]); }, false},
     {"z_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.device.position_mm[2]); }, false},
     {"axis_x", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[0]); }, false},
     {"axis_y", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[1]); }, false},
     {"axis_z", "1", [](const TickRecord& t) { return static_cast<double>(t.device.axis[2]); }, false},
-    {"drill_on", "0 or 1", [](const TickRecord& t) { return static_cast<double>(t.device.drill_on); }, true},
+    {"pedal", "0 to 255", [](const TickRecord& t) { return static_cast<double>(t.device.pedal); }, true},
     {"tool", "index", [](const TickRecord& t) { return static_cast<double>(t.device.tool); }, true},
     {"buttons", "bits", [](const TickRecord& t) { return static_cast<double>(t.device.buttons); }, true},
     {"device_age_ms", "ms", [](const TickRecord& t) { return static_cast<double>(t.device.age_ms); }, true},
@@ -49,6 +50,7 @@ constexpr Column kColumns[] = {
     {"shown_offset_x_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[0]); }, false},
     {"shown_offset_y_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[1]); }, false},
     {"shown_offset_z_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.shown_offset_mm[2]); }, false},
+    {"speed_rpm", "1/min", [](const TickRecord& t) { return static_cast<double>(t.speed_rpm); }, false},
     {"normal_force_n", "N", [](const TickRecord& t) { return static_cast<double>(t.normal_force_n); }, false},
     {"depth_mm", "mm", [](const TickRecord& t) { return static_cast<double>(t.depth_mm); }, false},
     {"removed_mm3", "mm3", [](const TickRecord& t) { return static_cast<double>(t.removed_mm3); }, false},
@@ -77,7 +79,7 @@ double seconds_of(const Session& s, std::uint64_t tick) {
 
 // How many ticks are missing right before each of those that there are, but for none.
 std::uint64_t lost_before(const Session& s, std::size_t i) {
-  return s.ticks[i].tick - (i == 0 ? 0 : s.ticks[i - 1].tick + 1);
+  return s.ticks[i].hand > 0 ? 0 : s.ticks[i].tick - (i == 0 ? 0 : s.ticks[i - 1].tick + 1);
 }
 
 /// What write_atomically() writes into, a block at a time.
@@ -311,7 +313,7 @@ void hdf5(const Session& s, const fs::path& path, const Context& context) {
   file.number("rate_hz", s.header.rate_hz);
   file.text("complete", s.end ? "yes" : "no");
   std::string burrs;
-  for (const Burr& b : burr_library()) burrs += (burrs.empty() ? "" : "; ") + b.name();
+  for (const Instrument& i : instrument_library()) burrs += (burrs.empty() ? "" : "; ") + i.name;
   file.text("tools", burrs);
   std::vector<double> values;
   std::vector<std::int64_t> whole;

@@ -56,11 +56,15 @@ ordered_json to_json(const HapticSetup& h) {
   HapticSetup copy = h;
   ordered_json j;
   j["params"] = fields_json(fields_of<HapticsParams>(copy.params));
-  j["device"] = {{"damping_n_s_per_m", h.device.damping_n_s_per_m},
-                 {"delay_s", h.device.delay_s},
-                 {"encoder_mm", h.device.encoder_mm},
-                 {"max_force_n", h.device.max_force_n},
-                 {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
+  const auto traits = [](const DeviceTraits& d) -> ordered_json {
+    return {{"damping_n_s_per_m", d.damping_n_s_per_m},
+            {"delay_s", d.delay_s},
+            {"encoder_mm", d.encoder_mm},
+            {"max_force_n", d.max_force_n},
+            {"max_stiffness_n_per_mm", d.max_stiffness_n_per_mm}};
+  };
+  j["devices"] = ordered_json::array();
+  for (std::size_t hand = 0; hand < h.hands(); ++hand) j["devices"].push_back(traits(h.device_of(hand)));
   j["tool_methods"] = ordered_json::array();
   for (const auto& [tool, method] : h.tool_methods) j["tool_methods"].push_back({tool, static_cast<int>(method)});
   j["hardness"] = h.hardness.value_or(false);
@@ -77,8 +81,13 @@ ordered_json to_json(const HapticSetup& h) {
 HapticSetup setup_of(const ordered_json& j) {
   HapticSetup h;
   read_fields(fields_of<HapticsParams>(h.params), j.at("params"));
-  const auto& d = j.at("device");
-  h.device = {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
+  const auto traits = [](const ordered_json& d) -> DeviceTraits {
+    return {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
+  };
+  const auto& devices = j.at("devices");
+  if (devices.empty() || devices.size() > kMostHands) throw Error(ExitCode::corrupt, "it has no hands, or more than there can be");
+  h.device = traits(devices[0]);
+  for (std::size_t hand = 1; hand < devices.size(); ++hand) h.more_devices.push_back(traits(devices[hand]));
   for (const auto& t : j.at("tool_methods")) {
     const int method = t.at(1);
     if (method < 0 || method >= static_cast<int>(EnumNames<ContactMethod>::values.size()))
@@ -253,6 +262,7 @@ SessionHeader header_of(const ordered_json& j, const std::string& name) {
     throw Error(ExitCode::corrupt, name + " was recorded by another version (" + h.program_version + ")", "replay it with that version");
   }
   h.haptics = setup_of(j.at("haptics"));
+  for (const auto& [name, value] : j.at("haptics").at("params").items()) h.setting_names.push_back(name);
   h.dust = j.value("dust", false);
   return h;
 }
@@ -270,9 +280,13 @@ class Reading {
       if (first == s_.ticks.size()) return;
       arrive(s_.ticks[first].tick);
       std::uint64_t changed = 0;
-      for (std::size_t t = first; t < s_.ticks.size(); ++t, ++next_tick_) {
-        if (s_.ticks[t].tick != next_tick_) missing();
-        changed += s_.ticks[t].voxels_changed;
+      for (std::size_t t = first; t < s_.ticks.size(); ++t) {
+        const TickRecord& r = s_.ticks[t];
+        // Of each tick all hands, in their order.
+        const std::uint32_t hand = t == 0 ? 0 : (s_.ticks[t - 1].hand + 1) % static_cast<std::uint32_t>(s_.header.haptics.hands());
+        if (r.hand != hand || r.tick + (hand > 0 ? 1 : 0) != next_tick_) missing();
+        next_tick_ += hand == 0 ? 1 : 0;
+        changed += r.voxels_changed;
       }
       unchanged_from_ = changed > 0 ? first : kNone;
     } else if (f.type == kChanges) {
@@ -281,7 +295,10 @@ class Reading {
     } else if (f.type == kActions) {
       std::vector<SceneAction> actions;
       append_records(actions, records<SceneAction>(f));
-      for (const SceneAction& a : actions) s_.actions.push_back({a, s_.changes.size()});
+      for (SceneAction& a : actions) {
+        if (a.is(ActionKind::setting)) a.item = setting(a.item);
+        s_.actions.push_back({a, s_.changes.size()});
+      }
     } else if (f.type == kGap) {
       std::vector<RecordingGap> gaps;
       append_records(gaps, records<RecordingGap>(f));
@@ -317,6 +334,7 @@ class Reading {
     if (s_.end || unchanged_from_ == kNone) return;
     s_.torn_ticks = s_.ticks.size() - unchanged_from_;
     s_.ticks.resize(unchanged_from_);
+    while (!s_.ticks.empty() && s_.ticks.back().hand + 1 != s_.header.haptics.hands()) s_.ticks.pop_back();
     for (Gap& g : s_.gaps) g.ticks_before = std::min(g.ticks_before, s_.ticks.size());
   }
 
@@ -338,6 +356,14 @@ class Reading {
     s_.gaps.push_back({next_tick_, 0, true, at, bytes, s_.ticks.size(), s_.changes.size(), s_.actions.size()});
     open_ = true;
     unchanged_from_ = kNone;
+  }
+  // Numbers of settings are those of the program that recorded; the header says which names they had.
+  std::uint32_t setting(std::uint32_t recorded) const {
+    const auto& names = s_.header.setting_names;
+    const int here = recorded < names.size() ? setting_number(names[recorded]) : -1;
+    if (here < 0)
+      throw Error(ExitCode::corrupt, name_ + " changes a setting that this version does not know", "it was recorded by another one; use that");
+    return static_cast<std::uint32_t>(here);
   }
   [[noreturn]] void missing() const { throw Error(ExitCode::corrupt, name_ + ": tick " + std::to_string(next_tick_) + " is missing"); }
 

@@ -276,7 +276,7 @@ class RehearsalWindow {
 
   [[nodiscard]] FreeWays free_ways(Rehearsal& rehearsal, bool whole_tool) const {
     const auto drill = static_cast<std::size_t>(tool_);
-    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
+    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_instrument(drill, whole_tool);
     std::optional<FreeWays> ways;
     rehearsal.look([&](const World& world, Follower&) { ways.emplace(world, std::move(skin)); });
     return *std::move(ways);
@@ -302,7 +302,7 @@ class RehearsalWindow {
     turn_handle(rehearsal, seconds);
     goal_.axis = to_floats(axis_);
     goal_.tool = static_cast<std::uint8_t>(tool_);
-    goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
+    goal_.pedal = drill_latched_ || drill_held_ ? 255 : 0;
     mouse->set_goal(goal_);
   }
 
@@ -349,7 +349,7 @@ class RehearsalWindow {
       goal_.position_mm = end.at_mm;
       axis_ = end.axis;
       goal_.axis = to_floats(axis_);
-      goal_.drill_on = 0;
+      goal_.pedal = 0;
       device.lead(way);
     };
     const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
@@ -560,7 +560,7 @@ class RehearsalWindow {
       tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
     }
     tool_matrix_->Modified();
-    const bool on = tick.device.drill_on != 0, shown = (tick.flags & kPlateInHand) == 0;
+    const bool on = tick.device.pedal != 0, shown = (tick.flags & kPlateInHand) == 0;
     burr_->SetVisibility(shown ? 1 : 0);
     shaft_->SetVisibility(shown ? 1 : 0);
     burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);

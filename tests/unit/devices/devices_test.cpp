@@ -270,7 +270,7 @@ TEST(ClosedLoop, UnpluggedAndPluggedInAgain) {
   l.loop.join();  // from here on this thread reads the device
   const auto gone = l.device.read(0, 1e-3, {});
   EXPECT_EQ(gone.age_ms, 255);
-  EXPECT_EQ(gone.drill_on, 0);
+  EXPECT_EQ(gone.pedal, 0);
   l.arm.plug();
   const auto begin = std::chrono::steady_clock::now();
   ASSERT_TRUE(l.wait_for([&] { return l.device.connected(); }));

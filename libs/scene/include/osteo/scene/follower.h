@@ -1,5 +1,6 @@
 // What reads the stream while bone is drilled: surface, pieces, dust.
 #pragma once
+#include <array>
 #include <deque>
 #include <map>
 #include <memory>
@@ -51,9 +52,10 @@ class Follower {
   /// Null where the scene has none.
   [[nodiscard]] Dust* dust() const { return dust_.get(); }
 
-  [[nodiscard]] const TickRecord& latest() const { return latest_; }
+  /// `hand` below kMostHands; of one that is not there: as it was made.
+  [[nodiscard]] const TickRecord& latest(std::size_t hand = 0) const { return latest_[hand]; }
   [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
-  /// Tools that have removed bone.
+  /// Instruments that have removed bone.
   [[nodiscard]] const std::set<std::uint8_t>& burrs_used() const { return burrs_used_; }
   /// Ticks in which bone was left that might have gone (kNoRoom).
   [[nodiscard]] std::uint64_t ticks_without_room() const { return ticks_without_room_; }
@@ -113,7 +115,7 @@ class Follower {
   std::deque<SceneAction> actions_;
   std::vector<TickRecord> ticks_;
   std::vector<VoxelChange> changes_;
-  TickRecord latest_;
+  std::array<TickRecord, kMostHands> latest_;
   double sawn_mm3_ = 0;
   std::uint64_t next_tick_ = 0, ticks_lost_ = 0;
   std::size_t happened_before_ = 0;  // actions whose turn comes still, and that have happened to the dust while catching up

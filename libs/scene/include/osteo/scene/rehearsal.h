@@ -16,6 +16,7 @@
 #include "osteo/scene/operation.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
+#include "osteo/session/script.h"
 
 namespace osteo {
 
@@ -69,6 +70,9 @@ struct RehearsalSummary {
 /// through the stream; the follower's thread changes the scene.
 class Rehearsal {
  public:
+  /// As many devices as options.haptics has hands, in their order. Error(usage) when they are not as many; cannot_write.
+  Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options, const Context& context);
+  /// Of one hand.
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
   ~Rehearsal();
 
@@ -84,7 +88,8 @@ class Rehearsal {
   /// Same bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
-  /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
+  /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is enough
+  /// (ActionRow::last_counts).
   void act(const SceneAction& action);
   /// Why the last action that could not be done was not; once.
   std::string take_refusal();
@@ -95,8 +100,8 @@ class Rehearsal {
   /// well.
   [[nodiscard]] std::string trouble() const;
 
-  /// Latest tick, for display.
-  [[nodiscard]] TickRecord latest() const { return latest_.load(); }
+  /// Latest tick of a hand, for display.
+  [[nodiscard]] TickRecord latest(std::size_t hand = 0) const { return latest_[hand].load(); }
   [[nodiscard]] double removed_mm3() const { return operation_.removed_mm3(); }
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
@@ -108,8 +113,10 @@ class Rehearsal {
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
   /// Edge of the finest voxels in the scene.
   [[nodiscard]] double finest_voxel_mm() const { return finest_voxel_mm_; }
-  [[nodiscard]] double stiffness_n_per_mm() const { return operation_.renderer().stiffness_n_per_mm(); }
-  [[nodiscard]] Device& device() { return *device_; }
+  [[nodiscard]] std::size_t hands() const { return devices_.size(); }
+  [[nodiscard]] Device& device(std::size_t hand = 0) { return *devices_[hand]; }
+  /// The settings as the last action has left them.
+  [[nodiscard]] HapticsParams settings() const;
   /// Null where the scene has none; under look() only.
   [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
@@ -124,18 +131,18 @@ class Rehearsal {
   bool run_on(const Context& context);
   RehearsalSummary finish();
 
-  std::unique_ptr<Device> device_;
+  std::vector<std::unique_ptr<Device>> devices_;
   RehearsalOptions options_;
   double voxel_mm3_, finest_voxel_mm_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   StreamReader* reader_ = nullptr;
   Operation operation_;
-  Seqlock<TickRecord> latest_;
+  std::array<Seqlock<TickRecord>, kMostHands> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
-  std::mutex mutex_;  // of world and follower
+  mutable std::mutex mutex_;  // of world and follower
   std::unique_ptr<Follower> follower_;
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;

@@ -21,6 +21,9 @@ struct SessionHeader {
   int burr_library = kBurrLibraryVersion;
   HapticSetup haptics;
   bool dust = false;  ///< the scene has bone dust
+  /// Read from a file: names of the settings under the numbers that its `setting` actions carry (the keys of haptics.params, in order);
+  /// read_session() gives the actions the numbers of this build. Not needed to write one.
+  std::vector<std::string> setting_names;
 };
 
 /// How it ended.
@@ -93,7 +96,7 @@ struct Gap {
 
 struct Session {
   SessionHeader header;
-  std::vector<TickRecord> ticks;  ///< their numbers rise by one but over gaps
+  std::vector<TickRecord> ticks;  ///< of each tick one for each hand, in order; their numbers rise by one but over gaps
   std::vector<VoxelChange>
       changes;  ///< in the order written; applied in this order, with the actions between them, they give the scene at the end
   std::vector<RecordedAction> actions;
