@@ -144,7 +144,8 @@ DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n)
   HandGoal goal;
   goal.tool = static_cast<std::uint8_t>(strokes_.tool);
   goal.axis = to_floats(strokes_.axis);
-  if (w[leg_].drill_on && leg_ + 1 < w.size()) goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg_].pedal, 0.0, 1.0)));
+  if (w[leg_].drill_on && leg_ + 1 < w.size())
+    goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg_].pedal, 0.0, 1.0)));
   goal.position_mm = w[leg_].at_mm;
   if (leg_ + 1 < w.size()) {
     const double s = std::clamp((t - w[leg_].t_s) / (w[leg_ + 1].t_s - w[leg_].t_s), 0.0, 1.0);

@@ -74,8 +74,7 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   Vec3 elastic = contact_.force_n, torque = contact_.torque_n_mm;
   if (common_.params.effects.shaft && has_head()) shaft(elastic, torque);
   if (usable_ && !(soft_.normal == Vec3{})) {
-    const double push =
-        std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0, law_.max_force_n);
+    const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0, law_.max_force_n);
     elastic += soft_.normal * push;
     if (push > 0) flags_ |= kSoftContact;
   }

@@ -10,8 +10,7 @@ namespace osteo {
 Servo::Servo(HapticRenderer& renderer, std::span<Device* const> devices, Stream& stream, double rate_hz)
     : renderer_(renderer), devices_(devices.begin(), devices.end()), stream_(stream), dt_s_(1 / rate_hz) {
   if (devices_.size() != renderer.hands())
-    throw Error(ExitCode::usage,
-                std::to_string(devices_.size()) + " devices for " + std::to_string(renderer.hands()) + " hands",
+    throw Error(ExitCode::usage, std::to_string(devices_.size()) + " devices for " + std::to_string(renderer.hands()) + " hands",
                 "give the traits of each device in the setup: device, more_devices");
 }
 

@@ -10,10 +10,7 @@ namespace osteo {
 
 Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices, Stream& stream,
                      double rate_hz)
-    : world_(std::move(world)),
-      setup_(setup),
-      renderer_(setup, anatomy, 1 / rate_hz),
-      servo_(renderer_, devices, stream, rate_hz) {
+    : world_(std::move(world)), setup_(setup), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, devices, stream, rate_hz) {
   scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, setup_));
   renderer_.show(scene_.get());
 }

@@ -362,7 +362,8 @@ class Reading {
     const auto& names = s_.header.setting_names;
     const int here = recorded < names.size() ? setting_number(names[recorded]) : -1;
     if (here < 0)
-      throw Error(ExitCode::corrupt, name_ + " changes a setting that this version does not know", "it was recorded by another one; use that");
+      throw Error(ExitCode::corrupt, name_ + " changes a setting that this version does not know",
+                  "it was recorded by another one; use that");
     return static_cast<std::uint32_t>(here);
   }
   [[noreturn]] void missing() const { throw Error(ExitCode::corrupt, name_ + ": tick " + std::to_string(next_tick_) + " is missing"); }

@@ -20,12 +20,12 @@ struct EnumNames<InstrumentKind> {
 /// All of them are felt when they touch bone; what they do besides needs the pedal.
 struct Instrument {
   InstrumentKind kind = InstrumentKind::burr;
-  std::string name;      ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm"
-  RoundCone head;        ///< its tip's centre at the origin, handle along +z
-  RoundCone shaft;       ///< behind it, in the same frame
-  int burr = -1;         ///< index in burr_library(); -1: none, it removes nothing
-  double rate = 0;       ///< sucker: mm3 of dust a second; irrigator: share of the dust that it carries away in a second; pedal down
-  double reach_mm = 0;   ///< of those two, around the tip's centre
+  std::string name;            ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm"
+  RoundCone head;              ///< its tip's centre at the origin, handle along +z
+  RoundCone shaft;             ///< behind it, in the same frame
+  int burr = -1;               ///< index in burr_library(); -1: none, it removes nothing
+  double rate = 0;             ///< sucker: mm3 of dust a second; irrigator: share of the dust that it carries away in a second; pedal down
+  double reach_mm = 0;         ///< of those two, around the tip's centre
   double falloff_per_rad = 0;  ///< burr: share of its efficiency lost for each radian of latitude
 
   [[nodiscard]] const Burr* as_burr() const { return burr < 0 ? nullptr : &burr_library()[static_cast<std::size_t>(burr)]; }

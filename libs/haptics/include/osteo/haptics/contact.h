@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "osteo/base/param.h"
-#include "osteo/bone/instrument.h"
 #include "osteo/bone/hardness.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/haptics/grains.h"
 #include "osteo/haptics/overlap.h"

@@ -26,7 +26,8 @@ class Grains {
   /// Voxels that have more bone than there count as untouched. Not in the servo.
   void inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known);
 
-  /// A hand's burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked at.
+  /// A hand's burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked
+  /// at.
   void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every = false, std::size_t hand = 0) noexcept;
   /// Takes what the burr covers of a voxel where it is placed, and tells how much bone is left that it never covered: density cannot fall
   /// below. Unless `every` voxel is looked at, rows of them take turns while the burr moves little. Cost: 5 ns where it covers the voxel

@@ -68,7 +68,7 @@ struct PlateInHand {
 struct HapticScene {
   struct Item {
     std::shared_ptr<TouchedBone> bone;
-    std::shared_ptr<DepthMap> depth_map;               ///< null where the setup does not want it
+    std::shared_ptr<DepthMap> depth_map;              ///< null where the setup does not want it
     std::vector<std::shared_ptr<HandContact>> hands;  ///< in their order
     RigidTransform world_from_body, body_from_world;
   };

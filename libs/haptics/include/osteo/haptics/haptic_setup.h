@@ -52,8 +52,8 @@ struct HapticsParams {
 /// Everything that decides what a rehearsal feels like; a session's header holds it. An empty part costs nothing.
 struct HapticSetup {
   HapticsParams params;
-  DeviceTraits device;                      ///< of hand 0
-  std::vector<DeviceTraits> more_devices;   ///< of hands 1, 2, ...: as many as there are hands besides, at most kMostHands - 1
+  DeviceTraits device;                        ///< of hand 0
+  std::vector<DeviceTraits> more_devices;     ///< of hands 1, 2, ...: as many as there are hands besides, at most kMostHands - 1
   std::map<int, ContactMethod> tool_methods;  ///< index in instrument_library() -> another method than params.contact.method for that tool
   std::optional<bool> hardness;  ///< removal goes by the HU of the case; empty: where it keeps them, which anatomy_of() settles
   std::string hardness_json;     ///< the law, as parse_hardness reads it; empty: the built-in one

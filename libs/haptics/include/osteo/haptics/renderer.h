@@ -46,8 +46,8 @@ class HapticRenderer {
   /// From the next step on. The scene belongs to the caller and must live until another is shown; it was made with the setup in force, or
   /// with what set() is given. No allocation.
   void show(HapticScene* scene) noexcept;
-  /// What soft tissue pushes a hand's tool with from now on (ActionKind::soft_push): a plane near the tool, made by whoever moves the tissue,
-  /// felt at full rate. Of a hand that is not there: nothing.
+  /// What soft tissue pushes a hand's tool with from now on (ActionKind::soft_push): a plane near the tool, made by whoever moves the
+  /// tissue, felt at full rate. Of a hand that is not there: nothing.
   void push(const SceneAction& soft_push) noexcept;
   /// Nothing is removed while held.
   void hold(bool on) noexcept;

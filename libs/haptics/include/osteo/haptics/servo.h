@@ -13,16 +13,16 @@ namespace osteo {
 
 /// Something done to the scene, and the scene that follows from it.
 struct Handover {
-  SceneAction action;                      ///< its tick is filled in when it happens
-  HapticScene* scene = nullptr;            ///< null: as before. Belongs to whoever posts; lives until another was taken.
-  bool held = false;                       ///< from now on nothing is removed
+  SceneAction action;                       ///< its tick is filled in when it happens
+  HapticScene* scene = nullptr;             ///< null: as before. Belongs to whoever posts; lives until another was taken.
+  bool held = false;                        ///< from now on nothing is removed
   const HapticsParams* settings = nullptr;  ///< null: as before. Belongs to whoever posts, read while it is taken up
 };
 
 class Servo {
  public:
-  /// All must outlive the servo. As many devices as the renderer has hands, in their order. `rate_hz` fixes the time step, whatever the clock
-  /// does. Error(usage) when devices and hands are not as many.
+  /// All must outlive the servo. As many devices as the renderer has hands, in their order. `rate_hz` fixes the time step, whatever the
+  /// clock does. Error(usage) when devices and hands are not as many.
   Servo(HapticRenderer& renderer, std::span<Device* const> devices, Stream& stream, double rate_hz);
   /// Of one hand.
   Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz);

@@ -16,10 +16,10 @@ namespace osteo {
 struct DeviceSample {
   std::array<float, 3> position_mm{};  ///< centre of the instrument's tip, LPS
   std::array<float, 3> axis{0, 0, 1};  ///< unit, from tip to handle
-  std::uint8_t pedal = 0;    ///< 0: up, 255: down as far as it goes, which a mere button is at once
-  std::uint8_t tool = 0;     ///< index in instrument_library()
-  std::uint8_t age_ms = 0;   ///< since the device last reported; 255: longer, or unplugged
-  std::uint8_t buttons = 0;  ///< of the device, beyond the pedal's
+  std::uint8_t pedal = 0;              ///< 0: up, 255: down as far as it goes, which a mere button is at once
+  std::uint8_t tool = 0;               ///< index in instrument_library()
+  std::uint8_t age_ms = 0;             ///< since the device last reported; 255: longer, or unplugged
+  std::uint8_t buttons = 0;            ///< of the device, beyond the pedal's
 };
 static_assert(sizeof(DeviceSample) == 28);
 
