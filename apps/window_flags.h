@@ -13,6 +13,13 @@ struct EnumNames<Hand> {
   static constexpr std::array<std::string_view, 4> values{"auto", "mouse", "spacemouse", "woodenhaptics"};
 };
 
+/// What moves the second hand.
+enum class SecondHand : int { keys, spacemouse, woodenhaptics };
+template <>
+struct EnumNames<SecondHand> {
+  static constexpr std::array<std::string_view, 3> values{"keys", "spacemouse", "woodenhaptics"};
+};
+
 struct WindowFlags {
   using Params = WindowFlags;
   std::string out;
@@ -23,6 +30,8 @@ struct WindowFlags {
   std::string settings;
   Hand device = Hand::automatic;
   std::string arm;
+  SecondHand second_device = SecondHand::keys;
+  std::string second_instrument = "sucker 10 Fr";
   bool dust = false;
   double rate_hz = 1000;
   std::string resume;
@@ -38,6 +47,11 @@ struct WindowFlags {
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"device", "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
     visit({"arm", "in the window, geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
+    visit({"second_device",
+           "in the window, what moves the second hand; keys: a sucker and water come beside the drill while V and I are held, with --dust"},
+          p.second_device);
+    visit({"second_instrument", "that the second hand holds, with a device of its own: sucker 10 Fr, irrigator 2 mm, probe 1 mm, a burr"},
+          p.second_instrument);
     visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);

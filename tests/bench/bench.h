@@ -7,6 +7,7 @@ namespace osteo {
 void bench_bone(const Context& context);      ///< resampling, surface
 void bench_geometry(const Context& context);  ///< distances, voxels, tetrahedra, curves, masks, skins
 void bench_haptics(const Context& context);   ///< contact, removal, god-object, stability, real time
+void bench_haptics_hands(const Context& context);
 void bench_haptics_fuzz(const Context& context);
 void bench_removal(const Context& context);    ///< what is removed against what the burr swept
 void bench_operation(const Context& context);  ///< scenes that are operated on: latency, split, plates, regions

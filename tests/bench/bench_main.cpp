@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   if (subject == "haptics" || subject == "all") osteo::bench_haptics(context);
   if (subject == "operation" || subject == "all") osteo::bench_operation(context);
   if (subject == "tissue" || subject == "all") osteo::bench_tissue(context);
+  if (subject == "haptics-hands") osteo::bench_haptics_hands(context);
   if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
   if (subject == "removal" || subject == "all") osteo::bench_removal(context);
 #ifdef OSTEO_BENCH_GEOMETRY
@@ -26,9 +27,10 @@ int main(int argc, char** argv) {
   }
 #endif
   if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" &&
-      subject != "operation" && subject != "tissue" && subject != "haptics-fuzz" && subject != "removal") {
+      subject != "operation" && subject != "tissue" && subject != "haptics-fuzz" && subject != "haptics-hands" && subject != "removal") {
     std::fprintf(stderr,
-                 "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, import, operation, removal, tissue\n",
+                 "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, haptics-hands, import, operation, "
+                 "removal, tissue\n",
                  subject.c_str());
     return 2;
   }

@@ -47,7 +47,7 @@ actions = [tuple(a[f["name"]][i] for f in session["header"]["records"]["action"]
 summary = json.loads((work / "session/summary.json").read_text())
 assert session["end"]["bone_hash"] == summary["bone_hash"] and not session["gaps"]
 assert abs(session["tick"]["removed_mm3"].astype(float).sum() - summary["removed_mm3"]) < 1e-6 * summary["removed_mm3"]
-assert session["header"]["actions"]["3"] == "saw" and len(session["header"]["burrs"]) > 10 and len(session["header"]["plates"]) > 2
+assert session["header"]["actions"]["3"] == "saw" and len(session["header"]["instruments"]) > 20 and len(session["header"]["plates"]) > 2
 assert len(session["change"]["voxel"]) > 100 and 0 <= session["change"]["density"].min() < session["change"]["density"].max() <= 1
 # A flipped bit takes its own frame with it and nothing else.
 damaged = bytearray(stream.read_bytes())

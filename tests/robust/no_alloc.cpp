@@ -105,19 +105,34 @@ TEST(Servo, NeitherAllocatesNorLocks) {
     setup.device = SpringHand::traits();
     setup.curve = {{-5, 0, 1}, {0, 3, 0}, {5, 0, 1}};
     const auto hardness = std::make_shared<const Hardness>(bone, to_sparse(bone, "hu"));
+    // A burr, and beside it a sucker, another burr and a probe.
+    setup.more_devices.assign(3, SpringHand::traits());
     HapticRenderer renderer(setup, bone, {hardness, nullptr, some_structures()}, 1e-3);
     Stream stream;
-    auto& reader = stream.add_reader(1 << 14, 1 << 22);
-    Script script;
+    auto& reader = stream.add_reader(1 << 15, 1 << 22);
+    Strokes script;
     script.axis = {0.6, 0, 0.8};
     for (int i = 0; i <= 40; ++i) script.waypoints.push_back({0.1 * i, {4 * std::sin(i), 4 * std::cos(i), 4 - 0.2 * i}, i % 5 != 0});
-    ScriptedDevice device(script, 1000);
-    ::osteo::Servo servo(renderer, device, stream, 1000);
+    std::vector<std::unique_ptr<ScriptedDevice>> devices;
+    std::vector<Device*> hands;
+    for (const int tool : {3, instrument_index("sucker 8 Fr"), 10, instrument_index("probe 1 mm")}) {
+      script.tool = tool;
+      hands.push_back(devices.emplace_back(std::make_unique<ScriptedDevice>(script, 1000)).get());
+      for (auto& w : script.waypoints) w.at_mm.x += 1.5;
+    }
+    ::osteo::Servo servo(renderer, hands, stream, 1000);
+    // Settings change and a scene is handed over in between.
+    HapticsParams softer = setup.params;
+    softer.contact.stiffness_n_per_mm = 1;
+    const Handover handover{SceneAction::setting(static_cast<std::uint32_t>(setting_number("stiffness_n_per_mm")), 1), nullptr, false,
+                            &softer};
     offences = 0;
     watched = true;
     while (servo.step(0)) {
+      if (servo.ticks() == 2000) servo.post(&handover);
     }
     watched = false;
+    EXPECT_EQ(renderer.stiffness_n_per_mm(3), 1);
     EXPECT_EQ(offences, 0) << EnumNames<ContactMethod>::values[static_cast<std::size_t>(method)];
     EXPECT_EQ(reader.dropped, 0u);
     EXPECT_EQ(servo.ticks(), 4000u);

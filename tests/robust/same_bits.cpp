@@ -57,8 +57,8 @@ void tools() {
         sum.add(shaft_cut_depth(tool)(share * burr.shaft().volume_mm3(), cosine));
       }
     }
-    const BurrSamples inside = sample_burr(burr);
-    const BurrSurface surface = sample_burr_surface(burr, 500);
+    const BurrSamples inside = sample_head(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n);
+    const BurrSurface surface = sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 500);
     sum.add(inside.offset_mm), sum.add(inside.inward), sum.add(inside.efficiency), sum.add(inside.sample_volume_mm3);
     sum.add(surface.offset_mm), sum.add(surface.inward), sum.add(surface.efficiency);
   }
@@ -118,7 +118,7 @@ void servo(ContactMethod method, int tool) {
   HapticRenderer renderer(setup, bone, {}, 1e-3);
   Stream stream;
   auto& reader = stream.add_reader(1 << 14, 1 << 22);
-  Script script;
+  Strokes script;
   script.tool = tool;
   script.axis = {0.6, 0, 0.8};
   for (int i = 0; i <= 30; ++i) script.waypoints.push_back({0.1 * i, {0.3 * (i % 7) - 1, 0.4 * (i % 5) - 1, 4 - 0.2 * i}, i % 5 != 0});

@@ -55,7 +55,7 @@ inline double drilled_mm3(ContactMethod method, double h, double rate_hz, int to
     const double s = t / rate_hz;
     goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
     goal.axis = {0.6F, 0, 0.8F};
-    goal.drill_on = 1;
+    goal.pedal = 255;
     goal.tool = static_cast<std::uint8_t>(tool);
     const auto [record, changes] = renderer.step(hand.step(goal, 1 / rate_hz, force));
     force = {record.force_n[0], record.force_n[1], record.force_n[2]};

@@ -80,7 +80,7 @@ struct Path {
     DeviceSample s;
     s.position_mm = to_floats(at(t_s));
     s.axis = to_floats(normalized(axis));
-    s.drill_on = 1;
+    s.pedal = 255;
     s.tool = static_cast<std::uint8_t>(tool);
     return s;
   }

@@ -20,10 +20,10 @@
 namespace osteo {
 namespace {
 
-// What moves the drill: as asked, or the best that is plugged in; with a pedal where there is one.
+// What moves the hands: as asked, or for the drill the best that is plugged in; with a pedal where there is one.
 class Hands {
  public:
-  Hands(Hand wanted, const std::string& arm_file) : hand_(wanted) {
+  explicit Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) {
     for (const FoundDevice& f : find_devices()) {
       const bool mouse = f.model == DeviceModel::space_mouse || f.model == DeviceModel::space_mouse_wireless;
       if (hand_ == Hand::automatic && f.readable && (mouse || f.model == DeviceModel::woodenhaptics))
@@ -33,32 +33,57 @@ class Hands {
                                              open_first([m = f.model](const HidInfo& i) { return model_of(i.vendor, i.product) == m; }));
     }
     if (hand_ == Hand::automatic) hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
-    if (!arm_file.empty()) geometry_ = load_woodenhaptics(arm_file);
+    second_ = flags.second_device == SecondHand::spacemouse      ? Hand::spacemouse
+              : flags.second_device == SecondHand::woodenhaptics ? Hand::woodenhaptics
+                                                                 : Hand::mouse;
+    second_tool_ = static_cast<std::uint8_t>(instrument_index(flags.second_instrument));
+    if (!flags.arm.empty()) geometry_ = load_woodenhaptics(flags.arm);
   }
-  /// `start`: where the hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small.
-  [[nodiscard]] std::unique_ptr<Device> make(const HandGoal& start, Vec3 near_mm) const {
-    // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
-    if (hand_ == Hand::spacemouse) {
-      return std::make_unique<SpaceMouseDevice>(open_first([](const HidInfo& i) {
-                                                  const DeviceModel m = model_of(i.vendor, i.product);
-                                                  return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
-                                                }),
-                                                start, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get());
-    }
-    if (hand_ == Hand::woodenhaptics) {
-      return std::make_unique<WoodenHapticsDevice>(
-          open_first([](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; }), geometry_,
-          WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1), start.tool, pedal_.get());
-    }
-    return std::make_unique<MouseDevice>(start);
+  /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small. The second
+  /// hand waits beside the first; moved by keys it is there for dust alone.
+  [[nodiscard]] std::vector<std::unique_ptr<Device>> make(const HandGoal& start, Vec3 near_mm) const {
+    std::vector<std::unique_ptr<Device>> all;
+    all.push_back(make_one(hand_, 0, start, near_mm));
+    if (second_ == Hand::mouse && !dust_) return all;
+    HandGoal beside = start;
+    const Vec3 off = any_perpendicular(from_floats(start.axis)) * 15;
+    beside.position_mm += off;
+    beside.tool = second_tool_;
+    all.push_back(make_one(second_, 1, beside, near_mm + off));
+    return all;
   }
   [[nodiscard]] std::string name() const {
-    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) + (pedal_ && hand_ != Hand::mouse ? " and pedal" : "");
+    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) +
+           (second_ != Hand::mouse ? ", " + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(second_)]) : "") +
+           (pedal_ && (hand_ != Hand::mouse || second_ != Hand::mouse) ? " and pedal" : "");
   }
 
  private:
-  Hand hand_;
+  // Two devices of a kind: the first of them is the first hand's.
+  [[nodiscard]] std::unique_ptr<Device> make_one(Hand kind, std::size_t number, const HandGoal& start, Vec3 near_mm) const {
+    const int before = number > 0 && hand_ == kind ? 1 : 0;
+    // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
+    if (kind == Hand::spacemouse) {
+      const auto wanted = [](const HidInfo& i) {
+        const DeviceModel m = model_of(i.vendor, i.product);
+        return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
+      };
+      return std::make_unique<SpaceMouseDevice>(open_first(wanted, before), start, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}},
+                                                pedal_.get(), number);
+    }
+    if (kind == Hand::woodenhaptics) {
+      const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
+      return std::make_unique<WoodenHapticsDevice>(open_first(wanted, before), geometry_,
+                                                   WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1),
+                                                   start.tool, pedal_.get(), number);
+    }
+    return std::make_unique<MouseDevice>(start);
+  }
+
+  Hand hand_, second_ = Hand::mouse;
+  bool dust_;
   int found_ = 0;
+  std::uint8_t second_tool_ = 0;
   WoodenHapticsGeometry geometry_;
   std::unique_ptr<FootPedal> pedal_;
 };
@@ -81,7 +106,7 @@ void close_at_exit();
 class Sitting {
  public:
   Sitting(const WindowFlags& flags, const Case& the_case, cli::Invocation& io)
-      : case_(the_case), io_(io), hands_(flags.device, flags.arm), next_folder_(flags.out), last_(flags.resume) {
+      : case_(the_case), io_(io), hands_(flags), next_folder_(flags.out), last_(flags.resume) {
     options_.rate_hz = flags.rate_hz;
     options_.follow = {true, true, flags.dust};
     options_.haptics.params.contact.method = flags.contact;
@@ -97,10 +122,12 @@ class Sitting {
     }
     SessionFolder session{next_folder_, case_.folder, from_case ? std::filesystem::path() : last_};
     World world = world_at_begin(session, case_, options_.anatomy, io_.context);
-    const HandPose pose = FreeWays(world, skin_of_burr(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
+    const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
     const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
-    auto device = hands_.make(start, near_the_bone(world, start));
-    options_.haptics.device = device->traits();
+    auto devices = hands_.make(start, near_the_bone(world, start));
+    options_.haptics.device = devices.front()->traits();
+    options_.haptics.more_devices.clear();
+    for (std::size_t h = 1; h < devices.size(); ++h) options_.haptics.more_devices.push_back(devices[h]->traits());
     options_.soft = soft_body_of(case_.folder);
     // Last, so that what fails before leaves no folder.
     const SessionFolder before = session_;
@@ -108,7 +135,7 @@ class Sitting {
     next_folder_.clear();
     options_.session_file = session_.stream();
     try {
-      rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(device), options_, io_.context);
+      rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
       rehearsal_->start();
       // Registered again: what the servo has made for itself by now must outlive it.
       static_cast<void>(plate_library());

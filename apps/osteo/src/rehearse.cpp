@@ -82,7 +82,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
   if (!p.headless) {
     for (const char* const name : {"script", "side", "seconds", "fast"}) refuse(name, "in the window", "add --headless, or leave it out");
   } else {
-    for (const char* const name : {"device", "arm"}) refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
+    for (const char* const name : {"device", "arm", "second_device", "second_instrument"})
+      refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
     for (const char* const name : {"width", "height", "state_file"}) refuse(name, "with --headless", "there is no window; leave it out");
   }
 }
@@ -128,8 +129,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.follow = {true, p.pieces, p.dust};
   options.actions = actions_of(script, p.rate_hz);
   options.soft = soft_body_of(the_case.folder);
-  auto device = std::make_unique<ScriptedDevice>(script, p.rate_hz);
-  Rehearsal rehearsal(std::move(world), std::move(device), options, io.context);
+  options.haptics.more_devices.assign(script.more_hands.size(), SpringHand::traits());
+  Rehearsal rehearsal(std::move(world), devices_of(script, p.rate_hz), options, io.context);
   const auto draw = [&](const char* name) {
     rehearsal.look([&](const World& w, SceneReaders& f) {
       save_picture(draw_world(w, f, rehearsal.structures(), view, rehearsal.soft()), folder / name);
@@ -163,7 +164,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   s.warnings.insert(s.warnings.begin(), doubts.begin(), doubts.end());
   // Before what takes time and may be interrupted or find the disk full.
   const std::string summary =
-      write_summary(session, s, p.rate_hz, burr_library()[static_cast<std::size_t>(script.tool)].name(), options.anatomy);
+      write_summary(session, s, p.rate_hz, instrument_library()[static_cast<std::size_t>(script.tool)].name, options.anatomy);
   io.end_progress();
   // Told even when quiet: the exit code is about them.
   for (const ActionNote& n : s.notes) {

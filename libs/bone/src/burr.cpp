@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kShaftDiameterMm = 2.35, kShaftLengthMm = 60;
 
-float efficiency_at(const Burr& burr, double sine_of_latitude) {
+float efficiency_at(double falloff_per_rad, double sine_of_latitude) {
   const double latitude = portable::asin(std::clamp(std::abs(sine_of_latitude), 0.0, 1.0));
-  return static_cast<float>(std::max(0.0, 1 - burr.falloff_mm3_per_s_per_n_per_rad * latitude / burr.rate_mm3_per_s_per_n));
+  return static_cast<float>(std::max(0.0, 1 - falloff_per_rad * latitude));
 }
 
 }  // namespace
@@ -52,27 +52,6 @@ const std::vector<Burr>& burr_library() {
   return library;
 }
 
-namespace {
-
-template <class ShapeOf>
-std::vector<CutDepth> cut_depths(ShapeOf shape_of) {
-  std::vector<CutDepth> all;
-  for (const Burr& b : burr_library()) all.emplace_back(shape_of(b));
-  return all;
-}
-
-}  // namespace
-
-const CutDepth& head_cut_depth(std::size_t tool) {
-  static const std::vector<CutDepth> all = cut_depths([](const Burr& b) { return b.head(); });
-  return all[tool];
-}
-
-const CutDepth& shaft_cut_depth(std::size_t tool) {
-  static const std::vector<CutDepth> all = cut_depths([](const Burr& b) { return b.shaft(); });
-  return all[tool];
-}
-
 int burr_index(BurrKind kind, double diameter_mm, BurrShape shape) {
   const auto& all = burr_library();
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -82,9 +61,8 @@ int burr_index(BurrKind kind, double diameter_mm, BurrShape shape) {
               "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
 }
 
-BurrSamples sample_burr(const Burr& burr) {
+BurrSamples sample_head(const RoundCone& head, double falloff_per_rad) {
   constexpr double kSamples = 3000;
-  const RoundCone head = burr.head();
   const double r = head.largest_radius_mm(), volume = head.volume_mm3(), pitch = portable::cbrt(volume / kSamples);
   BurrSamples s;
   const int n = static_cast<int>(std::ceil(r / pitch)) + 1, top = n + static_cast<int>(std::ceil(head.length_mm / pitch));
@@ -96,7 +74,7 @@ BurrSamples sample_burr(const Burr& burr) {
         const Vec3 inward = normalized(Vec3{0, 0, head.foot_mm(portable::hypot(p.x, p.y), p.z)} - p);
         s.offset_mm.push_back(to_floats(p));
         s.inward.push_back(to_floats(inward));
-        s.efficiency.push_back(efficiency_at(burr, inward.z));
+        s.efficiency.push_back(efficiency_at(falloff_per_rad, inward.z));
       }
     }
   }
@@ -104,8 +82,7 @@ BurrSamples sample_burr(const Burr& burr) {
   return s;
 }
 
-BurrSurface sample_burr_surface(const Burr& burr, int samples) {
-  const RoundCone h = burr.head();
+BurrSurface sample_head_surface(const RoundCone& h, double falloff_per_rad, int samples) {
   // Along the profile from tip to top by area: the zone of the tip's ball, the side, the zone of the end's ball.
   const double b = h.slope(), a = std::sqrt(1 - b * b), r1 = h.start_radius_mm, r2 = h.end_radius_mm, pi = std::numbers::pi;
   const double tip = 2 * pi * r1 * r1 * (1 + b), top = 2 * pi * r2 * r2 * (1 - b);
@@ -134,7 +111,7 @@ BurrSurface sample_burr_surface(const Burr& burr, int samples) {
     s.offset_mm.push_back(to_floats(Vec3{0, 0, foot} + normal * radius));
     s.inward.push_back(to_floats(-normal));
     s.reach_mm.push_back(static_cast<float>(radius));
-    s.efficiency.push_back(efficiency_at(burr, normal_z));
+    s.efficiency.push_back(efficiency_at(falloff_per_rad, normal_z));
   }
   return s;
 }

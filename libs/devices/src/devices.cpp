@@ -37,8 +37,14 @@ Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, dou
   return force * (share * (n > most ? most / n : 1.0));
 }
 
-SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal)
-    : goal_(start), tool_(start.tool), rotation_(rotation), pedal_(pedal), link_(std::move(open), *this, 100) {}
+SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal,
+                                   std::size_t hand)
+    : goal_(start),
+      tool_(start.tool),
+      rotation_(rotation),
+      pedal_(pedal),
+      pedal_bit_(osteo::pedal_bit(hand)),
+      link_(std::move(open), *this, 100) {}
 
 void SpaceMouseDevice::report(HidPort&, std::span<const std::byte> report) {
   if (!decode_space_mouse(report, own_.state)) return;
@@ -66,7 +72,7 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
     goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
   const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
-  goal_.drill_on = (s.buttons & 1U) != 0 || (pressed & 1U) != 0 ? 1 : 0;
+  goal_.pedal = (s.buttons & 1U) != 0 || (pressed & pedal_bit_) != 0 ? 255 : 0;
   DeviceSample sample = hand_.step(goal_, dt_s, force_n);
   sample.buttons = static_cast<std::uint8_t>(s.buttons);
   // The cap at rest sends nothing, so silence is not a sign of an unplugged device; gone() says that.
@@ -74,12 +80,13 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
 }
 
 WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
-                                         const FootPedal* pedal)
+                                         const FootPedal* pedal, std::size_t hand)
     : geometry_(geometry),
       kinematics_(geometry),
       map_(map),
       tool_(static_cast<std::uint8_t>(tool)),
       pedal_(pedal),
+      pedal_bit_(osteo::pedal_bit(hand)),
       link_(std::move(open), *this, 2) {}
 
 DeviceTraits WoodenHapticsDevice::traits() const {
@@ -139,7 +146,7 @@ DeviceSample WoodenHapticsDevice::read(std::uint64_t, double, Vec3) noexcept {
     silent_ = false;
   }
   s.axis = to_floats(normalized(map_.direction(last_pose_.axis)));
-  s.drill_on = last_pose_.button || (pressed & 1U) != 0 ? 1 : 0;
+  s.pedal = last_pose_.button || (pressed & pedal_bit_) != 0 ? 255 : 0;
   s.tool = tool_;
   return s;
 }

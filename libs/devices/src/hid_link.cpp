@@ -76,11 +76,12 @@ void HidLink::read_on() {
   }
 }
 
-HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted) {
-  return [wanted = std::move(wanted)](std::string& why) -> std::unique_ptr<HidPort> {
+HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted, int before) {
+  return [wanted = std::move(wanted), before](std::string& why) -> std::unique_ptr<HidPort> {
     why = "no such device";
+    int passed = 0;
     for (const HidInfo& info : list_hid()) {
-      if (!wanted(info)) continue;
+      if (!wanted(info) || passed++ < before) continue;
       if (auto port = open_hid(info, why)) return port;
     }
     return nullptr;

@@ -9,8 +9,8 @@ namespace osteo {
 
 std::size_t most_hits(double spacing_mm) {
   double most = 0;
-  for (const Burr& b : burr_library()) {
-    const RoundCone head = b.head();
+  for (const Instrument& i : instrument_library()) {
+    const RoundCone& head = i.head;
     // One voxel thicker all around, since covered voxels count however little they are covered.
     const double r = head.largest_radius_mm() + spacing_mm;
     most = std::max(most, RoundCone{0, head.length_mm, r, r}.volume_mm3());
@@ -45,10 +45,10 @@ Removal::Removal(const BrickGrid& bone)
     : grains_(bone), reached_(most_hits(bone.frame().spacing_mm.x) + 512), changes_(most_hits(bone.frame().spacing_mm.x)) {}
 
 std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm,
-                                             double dt_s, const Hardness* hardness, double& removed_mm3) noexcept {
+                                             double dt_s, const Hardness* hardness, double& removed_mm3, std::size_t hand) noexcept {
   removed_mm3 = 0;
   if (cut.hits.empty() || !(cut.weight_mm3 > 0) || !(cut.bone_mm3 > 0) || !(force_n > 0)) return {};
-  grains_.place(bone, burr.head(), cut.at_mm, cut.axis, cut.in_turns);
+  grains_.place(bone, burr.head(), cut.at_mm, cut.axis, cut.in_turns, hand);
   double listed = 0, resisted = 0;
   for (std::size_t i = 0; i < cut.hits.size(); ++i) {
     const Hit& h = cut.hits[i];
@@ -61,7 +61,7 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
   if (!(resisted > 0)) return {};
   const double efficiency = cut.weight_mm3 / cut.bone_mm3, ease = resisted / listed;
   const double full = burr.rate_mm3_per_s_per_n * speed_rpm / Burr::kNominalRpm * dt_s;
-  const double wanted = full * efficiency * force_n * ease + carry_mm3_;
+  const double wanted = full * efficiency * force_n * ease + carry_mm3_[hand];
   const double voxel_mm3 = bone.frame().voxel_volume_mm3();
   std::size_t changed = 0;
   for (std::size_t i = 0; i < cut.hits.size() && changed < changes_.size(); ++i) {
@@ -77,7 +77,7 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
     removed_mm3 += static_cast<double>(before - after) * voxel_mm3;
   }
   // What emptied voxels could not give, or rounding kept back, waits; but no more than a tick's worth at 10 N.
-  carry_mm3_ = std::clamp(wanted - removed_mm3, 0.0, full * 10);
+  carry_mm3_[hand] = std::clamp(wanted - removed_mm3, 0.0, full * 10);
   return {changes_.data(), changed};
 }
 

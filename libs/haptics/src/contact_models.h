@@ -19,7 +19,7 @@ namespace osteo {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 [[nodiscard]] inline std::size_t tool_of(const DeviceSample& s) {
-  return std::min<std::size_t>(s.tool, burr_library().size() - 1);
+  return std::min<std::size_t>(s.tool, instrument_library().size() - 1);
 }
 
 /// The overlap of the library's heads, and what they cut by it: the same voxels whatever method the force comes from.
@@ -51,7 +51,6 @@ class ExactOverlap final : public ContactModel {
   [[nodiscard]] const OverlapResult* overlapped() const noexcept override { return &head_.last(); }
 
  private:
-  ContactParams params_;
   HeadOverlap head_;
 };
 
@@ -76,7 +75,6 @@ class BurrProxy final : public ContactModel {
   void rest() noexcept override { proxy_.forget(); }
 
  private:
-  ContactParams params_;
   double spacing_mm_;
   std::vector<RoundCone> shells_;
   const std::vector<CutDepth>& shell_depths_;
@@ -107,7 +105,6 @@ class VolumeSampling final : public ContactModel {
   };
   void orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept;
 
-  ContactParams params_;
   std::vector<Tool> tools_;
   HeadOverlap head_;
   DeviceSample last_;
@@ -123,7 +120,6 @@ class RaySampling final : public ContactModel {
 
  private:
   static constexpr int kSamples = 400;
-  ContactParams params_;
   std::vector<BurrSurface> tools_;
   HeadOverlap head_;
   DeviceSample last_;

@@ -36,7 +36,7 @@ DeviceSample SpringHand::step(const HandGoal& goal, double dt_s, Vec3 force_n) n
   DeviceSample sample;
   sample.position_mm = to_floats(position_mm_);
   sample.axis = goal.axis;
-  sample.drill_on = goal.drill_on;
+  sample.pedal = goal.pedal;
   sample.tool = goal.tool;
   return sample;
 }
@@ -106,7 +106,7 @@ DeviceSample GuidedHand::step(HandGoal& goal, double dt_s, Vec3 force_n) noexcep
         ++leg_;
       }
     }
-    goal.drill_on = 0;
+    goal.pedal = 0;
     if (now_.way.count == 0) {
       if (quiet_s_ > kQuietS || waited_s_ > kPatienceS) end(false);
     } else if (waited_s_ > kPatienceS) {
@@ -139,12 +139,13 @@ DeviceSample MouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexcep
 
 DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept {
   const double t = static_cast<double>(tick) / rate_hz_;
-  const auto& w = script_.waypoints;
+  const auto& w = strokes_.waypoints;
   while (leg_ + 1 < w.size() && w[leg_ + 1].t_s <= t) ++leg_;
   HandGoal goal;
-  goal.tool = static_cast<std::uint8_t>(script_.tool);
-  goal.axis = to_floats(script_.axis);
-  goal.drill_on = w[leg_].drill_on && leg_ + 1 < w.size() ? 1 : 0;
+  goal.tool = static_cast<std::uint8_t>(strokes_.tool);
+  goal.axis = to_floats(strokes_.axis);
+  if (w[leg_].drill_on && leg_ + 1 < w.size())
+    goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg_].pedal, 0.0, 1.0)));
   goal.position_mm = w[leg_].at_mm;
   if (leg_ + 1 < w.size()) {
     const double s = std::clamp((t - w[leg_].t_s) / (w[leg_ + 1].t_s - w[leg_].t_s), 0.0, 1.0);

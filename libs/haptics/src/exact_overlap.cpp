@@ -14,14 +14,14 @@ RoundCone shell_of(RoundCone head, double spacing_mm) {
   return head;
 }
 
-// Tables of all burrs' shells take a quarter of a second: kept for each spacing that was used.
+// Tables of all shells take a quarter of a second: kept for each spacing that was used.
 const std::vector<CutDepth>& shell_depths(double spacing_mm) {
   static std::mutex mutex;
   static std::map<double, std::vector<CutDepth>> known;
   const std::lock_guard lock(mutex);
   std::vector<CutDepth>& tables = known[spacing_mm];
   if (tables.empty()) {
-    for (const Burr& b : burr_library()) tables.emplace_back(shell_of(b.head(), spacing_mm));
+    for (const Instrument& i : instrument_library()) tables.emplace_back(shell_of(i.head, spacing_mm));
   }
   return tables;
 }
@@ -29,21 +29,17 @@ const std::vector<CutDepth>& shell_depths(double spacing_mm) {
 // With more voxels under the burr than may change in a tick, their rows take turns.
 std::vector<std::uint32_t> strides_for(double spacing_mm) {
   std::vector<std::uint32_t> strides;
-  for (const Burr& b : burr_library()) {
-    const double voxels = b.head().volume_mm3() / (spacing_mm * spacing_mm * spacing_mm);
+  for (const Instrument& i : instrument_library()) {
+    const double voxels = i.head.volume_mm3() / (spacing_mm * spacing_mm * spacing_mm);
     strides.push_back(static_cast<std::uint32_t>(std::max(1.0, std::ceil(voxels / kMostCutPerTick))));
   }
   return strides;
 }
 
-double falloff_share(const Burr& b) {
-  return b.falloff_mm3_per_s_per_n_per_rad / b.rate_mm3_per_s_per_n;
-}
-
 }  // namespace
 
 HeadOverlap::HeadOverlap(double spacing_mm) : strides_(strides_for(spacing_mm)), overlap_(most_hits(spacing_mm)) {
-  for (const Burr& b : burr_library()) heads_.push_back(b.head());
+  for (const Instrument& i : instrument_library()) heads_.push_back(i.head);
 }
 
 const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept {
@@ -53,7 +49,7 @@ const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, std::size_t too
   at_mm_ = at_mm;
   axis_ = axis;
   stride_ = strides_[tool];
-  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, falloff_share(burr_library()[tool]), stride_, phase_++);
+  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, instrument_library()[tool].falloff_per_rad, stride_, phase_++);
   return last_;
 }
 
@@ -62,14 +58,14 @@ Cut HeadOverlap::cut() const noexcept {
   return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3, at_mm_, axis_, stride_ > 1};
 }
 
-ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
+ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
   static_cast<void>(head_cut_depth(0));  // not in the servo
 }
 
 ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
   const std::size_t tool = tool_of(pose);
   const Vec3 axis = axis_of(pose);
-  const OverlapResult& o = head_.measure(bone, tool, position_of(pose), axis, pose.drill_on != 0);
+  const OverlapResult& o = head_.measure(bone, tool, position_of(pose), axis, pose.pedal != 0);
   ContactResult r = contact_of_overlap(params_, tool, o, axis);
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(o.bone_mm3 / bone.frame().voxel_volume_mm3())));
   return r;
@@ -83,7 +79,7 @@ ContactResult contact_of_overlap(const ContactParams& params, std::size_t tool, 
   r.normal = overlap.area_mm2 * (-1 / pressed);
   const double cosine = -dot(r.normal, axis);
   r.depth_mm = head_cut_depth(tool)(overlap.sharp_mm3, cosine);
-  const double left = push_left(overlap, r.depth_mm, burr_library()[tool].head());
+  const double left = push_left(overlap, r.depth_mm, instrument_library()[tool].head);
   r.normal_force_n = left * params.force_n(r.depth_mm);
   r.force_n = r.normal * r.normal_force_n;
   r.torque_n_mm = cross(axis, overlap.area_foot_mm3) * (-r.normal_force_n / pressed);
@@ -97,8 +93,8 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 }
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
-    : params_(params), spacing_mm_(spacing_mm), shell_depths_(shell_depths(spacing_mm)), overlap_(0), head_(spacing_mm) {
-  for (const Burr& b : burr_library()) shells_.push_back(shell_of(b.head(), spacing_mm));
+    : ContactModel(params), spacing_mm_(spacing_mm), shell_depths_(shell_depths(spacing_mm)), overlap_(0), head_(spacing_mm) {
+  for (const Instrument& i : instrument_library()) shells_.push_back(shell_of(i.head, spacing_mm));
 }
 
 ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
@@ -140,8 +136,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
     return c;
   };
   GodObjectParams g;
-  g.friction = pose.drill_on != 0 ? 0 : params_.friction;
-  g.static_friction = pose.drill_on != 0 ? 0 : params_.static_friction;
+  g.friction = pose.pedal != 0 ? 0 : params_.friction;
+  g.static_friction = pose.pedal != 0 ? 0 : params_.static_friction;
   g.feature_mm = 0.5 * spacing_mm_;
   g.tolerance_mm = 1e-2 * spacing_mm_;
   g.evaluations = spacing_mm_ < 0.3 ? 8 : 16;  // 100 to 200 us at most
@@ -160,7 +156,7 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   }
   r.bone_mm3 = there.bone_mm3;
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(there.bone_mm3 / bone.frame().voxel_volume_mm3())));
-  cutting_ = pose.drill_on != 0 && r.normal_force_n > 0;
+  cutting_ = pose.pedal != 0 && r.normal_force_n > 0;
   // The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks.
   advance_mm_ = answer.proxy_mm - offset * std::min(1.0, 0.75 * spacing_mm_ / r.depth_mm);
   return r;

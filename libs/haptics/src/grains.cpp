@@ -102,15 +102,16 @@ void Grains::erase(std::size_t slot) noexcept {
   --used_;
 }
 
-void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every) noexcept {
+void Grains::place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every, std::size_t hand) noexcept {
   const Frame& frame = bone.frame();
   const double h = frame.spacing_mm.x, b = head.slope();
   const Vec3 start = frame.index_from_world(start_mm + axis * head.start_mm);
-  const double moved_mm = length(start - start_) * h + length(axis - axis_) * head.length_mm;
-  start_ = start;
-  axis_ = axis;
+  Place& last = places_[hand];
+  const double moved_mm = length(start - last.start) * h + length(axis - last.axis) * head.length_mm;
+  last.start = start_ = start;
+  last.axis = axis;
   turns_ = every ? 1 : moved_mm * kMostTurns < kTurnMm ? kMostTurns : moved_mm * 2 < kTurnMm ? 2 : 1;
-  ++turn_;
+  turn_ = ++last.turn;
   const Vec3 along = transposed(frame.direction) * axis;
   for (std::size_t a = 0; a < 3; ++a) head_.axis[a] = static_cast<float>(along[a]);
   head_.length = static_cast<float>(head.length_mm / h);

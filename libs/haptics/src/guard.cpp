@@ -45,8 +45,14 @@ double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, d
   return std::min((energy_mj_ - feigned) / (speed2 * dt_s) * 1000, most);
 }
 
-Guard::Guard(const GuardParams& params, const DeviceTraits& device)
-    : params_(params), device_(device), most_n_(std::min(limit_of(params.max_force_n), limit_of(device.max_force_n))) {}
+Guard::Guard(const GuardParams& params, const DeviceTraits& device) : device_(device) {
+  set(params);
+}
+
+void Guard::set(const GuardParams& params) noexcept {
+  params_ = params;
+  most_n_ = std::min(limit_of(params.max_force_n), limit_of(device_.max_force_n));
+}
 
 Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   Output out;

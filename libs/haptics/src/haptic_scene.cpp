@@ -7,30 +7,12 @@
 
 namespace osteo {
 
-TouchedBone::TouchedBone(const HapticSetup& setup, std::shared_ptr<Body> body) : TouchedBone(setup, body->bone, body->hardness) {
+TouchedBone::TouchedBone(std::shared_ptr<Body> body) : TouchedBone(body->bone, body->hardness) {
   body_ = std::move(body);
 }
 
-TouchedBone::TouchedBone(const HapticSetup& setup, BrickGrid& bone, std::shared_ptr<const Hardness> hardness)
-    : bone_(bone), hardness_(std::move(hardness)), removal_(bone) {
-  const double spacing = bone.frame().spacing_mm.x;
-  const HapticsParams& params = setup.params;
-  method_of_tool_.assign(burr_library().size(), params.contact.method);
-  for (const auto& [tool, method] : setup.tool_methods) {
-    if (tool >= 0 && tool < static_cast<int>(method_of_tool_.size())) method_of_tool_[static_cast<std::size_t>(tool)] = method;
-  }
-  for (const ContactMethod method : method_of_tool_) {
-    auto& model = models_[static_cast<std::size_t>(method)];
-    if (model) continue;
-    ContactParams p = params.contact;
-    p.method = method;
-    model = make_contact_model(p, spacing);
-  }
-  if (params.effects.fail_safe) {
-    depth_map_ = std::make_unique<DepthMap>(bone);
-    changed_.resize(most_hits(spacing));
-  }
-  if (params.effects.shaft) static_cast<void>(shaft_cut_depth(0));  // not in the servo
+TouchedBone::TouchedBone(BrickGrid& bone, std::shared_ptr<const Hardness> hardness)
+    : bone_(bone), hardness_(std::move(hardness)), removal_(bone), voxels_(most_hits(bone.frame().spacing_mm.x)) {
   Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
     const Ijk o = bone.brick_coordinate(b);
@@ -44,7 +26,11 @@ TouchedBone::TouchedBone(const HapticSetup& setup, BrickGrid& bone, std::shared_
   half_index_ = (hi - lo) * 0.5;
 }
 
-TouchedBone::~TouchedBone() = default;
+std::span<const VoxelKey> TouchedBone::voxels_of(std::span<const VoxelChange> changes) noexcept {
+  const std::size_t n = std::min(changes.size(), voxels_.size());
+  for (std::size_t c = 0; c < n; ++c) voxels_[c] = changes[c].voxel;
+  return {voxels_.data(), n};
+}
 
 void TouchedBone::inherit(const TouchedBone& before) {
   removal_.grains().inherit(bone_, before.bone_, before.removal_.grains());
@@ -71,35 +57,96 @@ PlateInHand::PlateInHand(const PlateModel& plate, int count) {
   }
 }
 
-void HapticScene::make_room() {
+namespace {
+
+// Those that some instrument uses.
+std::array<bool, EnumNames<ContactMethod>::values.size()> wanted_methods(const HapticSetup& setup) {
+  std::array<bool, EnumNames<ContactMethod>::values.size()> wanted{};
+  for (std::size_t tool = 0; tool < instrument_library().size(); ++tool) wanted[static_cast<std::size_t>(method_of(setup, tool))] = true;
+  return wanted;
+}
+
+// Whatever of an item follows from the setup; `before`: the same body's until now.
+void fit(HapticScene::Item& item, const HapticSetup& setup, const HapticScene::Item* before) {
+  const BrickGrid& bone = item.bone->bone();
+  if (setup.params.effects.fail_safe)
+    item.depth_map = before != nullptr && before->depth_map ? before->depth_map : std::make_shared<DepthMap>(bone);
+  for (std::size_t h = 0; h < setup.hands(); ++h) {
+    auto known = before != nullptr && h < before->hands.size() ? before->hands[h] : nullptr;
+    item.hands.push_back(known && known->serves(setup) ? known
+                                                       : std::make_shared<HandContact>(setup, bone.frame().spacing_mm.x, known.get()));
+  }
+}
+
+void make_room(HapticScene& scene, const HapticSetup& setup) {
+  if (setup.params.effects.shaft) static_cast<void>(shaft_cut_depth(0));  // not in the servo
   std::size_t room = 0;
-  for (const Item& i : items) room = std::max(room, most_hits(i.bone->bone().frame().spacing_mm.x));
-  changes.resize(room * HapticRenderer::kMostTouched);
+  for (const HapticScene::Item& i : scene.items) room = std::max(room, most_hits(i.bone->bone().frame().spacing_mm.x));
+  scene.changes.resize(room * std::min(HapticRenderer::kMostTouched, scene.items.size()) * setup.hands());
+}
+
+}  // namespace
+
+ContactMethod method_of(const HapticSetup& setup, std::size_t tool) {
+  const auto it = setup.tool_methods.find(static_cast<int>(tool));
+  return it == setup.tool_methods.end() ? setup.params.contact.method : it->second;
+}
+
+HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before) {
+  if (before != nullptr) models = before->models;
+  const auto wanted = wanted_methods(setup);
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (!wanted[m] || models[m]) continue;
+    ContactParams p = setup.params.contact;
+    p.method = static_cast<ContactMethod>(m);
+    models[m] = make_contact_model(p, spacing_mm);
+  }
+}
+
+bool HandContact::serves(const HapticSetup& setup) const {
+  const auto wanted = wanted_methods(setup);
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (wanted[m] && !models[m]) return false;
+  }
+  return true;
+}
+
+void HapticScene::add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body, const HapticSetup& setup) {
+  items.push_back({std::move(bone), nullptr, {}, world_from_body, world_from_body.inverse()});
+  fit(items.back(), setup, nullptr);
+  make_room(*this, setup);
+}
+
+bool HapticScene::needs_bone_held(const HapticSetup& setup) const {
+  return setup.params.effects.fail_safe && std::any_of(items.begin(), items.end(), [](const Item& i) { return !i.depth_map; });
 }
 
 HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const HapticScene* before) {
   HapticScene scene;
+  const std::span<const Item> known = before != nullptr ? std::span<const Item>(before->items) : std::span<const Item>();
   for (const PlacedBody& placed : world.bodies()) {
-    Item item{nullptr, placed.world_from_body, placed.world_from_body.inverse()};
-    for (std::size_t i = 0; before != nullptr && i < before->items.size(); ++i) {
-      if (before->items[i].bone->body() == placed.body.get()) item.bone = before->items[i].bone;
-    }
-    if (!item.bone) {
-      item.bone = std::make_shared<TouchedBone>(setup, placed.body);
+    Item item{nullptr, nullptr, {}, placed.world_from_body, placed.world_from_body.inverse()};
+    const auto same = std::find_if(known.begin(), known.end(), [&](const Item& i) { return i.bone->body() == placed.body.get(); });
+    if (same != known.end()) {
+      item.bone = same->bone;
+    } else {
+      item.bone = std::make_shared<TouchedBone>(placed.body);
       // Of those that are gone: another has their place, they came apart, or were put together again.
-      for (std::size_t i = 0; before != nullptr && i < before->items.size(); ++i) {
-        const Body* const old = before->items[i].bone->body();
+      for (const Item& old : known) {
         const auto& bodies = world.bodies();
-        if (std::none_of(bodies.begin(), bodies.end(), [&](const PlacedBody& b) { return b.body.get() == old; }))
-          item.bone->inherit(*before->items[i].bone);
+        if (std::none_of(bodies.begin(), bodies.end(), [&](const PlacedBody& b) { return b.body.get() == old.bone->body(); }))
+          item.bone->inherit(*old.bone);
       }
     }
+    fit(item, setup, same != known.end() ? &*same : nullptr);
     scene.items.push_back(std::move(item));
   }
-  if (const std::uint32_t plate = world.grip().plate; plate != SceneAction::kNobody)
-    scene.plate = std::make_shared<const PlateInHand>(plate_library()[plate]);
-  scene.grip = world.grip().hand_from_plate;
-  scene.make_room();
+  for (std::uint32_t hand = 0; hand < kMostHands; ++hand) {
+    const World::Grip& grip = world.grip(hand);
+    if (grip.plate != SceneAction::kNobody) scene.held[hand].plate = std::make_shared<const PlateInHand>(plate_library()[grip.plate]);
+    scene.held[hand].grip = grip.hand_from_plate;
+  }
+  make_room(scene, setup);
   return scene;
 }
 

@@ -18,9 +18,9 @@ Mat3 world_from_tool(Vec3 axis) {
 
 }  // namespace
 
-VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
-  for (const Burr& burr : burr_library()) {
-    Tool tool{sample_burr(burr), {}, {}, {}, false};
+VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
+  for (const Instrument& i : instrument_library()) {
+    Tool tool{sample_head(i.head, i.falloff_per_rad), {}, {}, {}, false};
     tool.offset_index.resize(tool.samples.offset_mm.size());
     tool.inward_index.resize(tool.samples.offset_mm.size());
     tools_.push_back(std::move(tool));
@@ -50,7 +50,7 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   orient(tool, bone, to_floats(axis));
 
   const Vec3 centre = bone.frame().index_from_world(position);
-  const RoundCone head = burr_library()[number].head();
+  const RoundCone& head = instrument_library()[number].head;
   const double reach = (head.length_mm + head.largest_radius_mm()) / bone.frame().spacing_mm.x + 1;
   const auto& dims = bone.frame().dims;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -92,12 +92,12 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
 }
 
 Cut VolumeSampling::cut(const BrickGrid& bone) noexcept {
-  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.drill_on != 0);
+  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.pedal != 0);
   return head_.cut();
 }
 
-RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : params_(params), head_(spacing_mm) {
-  for (const Burr& burr : burr_library()) tools_.push_back(sample_burr_surface(burr, kSamples));
+RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
+  for (const Instrument& i : instrument_library()) tools_.push_back(sample_head_surface(i.head, i.falloff_per_rad, kSamples));
   static_cast<void>(head_cut_depth(0));  // not in the servo
 }
 
@@ -139,9 +139,9 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
   r.normal = normalized(push);
   r.bone_mm3 = volume;
   // On flat bone a ball's sum is pi r d^2, whatever the depth; for other shapes it is nearly the volume.
-  const Burr& burr = burr_library()[tool_of(pose)];
-  r.depth_mm = burr.shape == BurrShape::ball ? std::sqrt(volume / (std::numbers::pi * burr.diameter_mm / 2))
-                                             : head_cut_depth(tool_of(pose))(volume, -dot(r.normal, axis));
+  const RoundCone& head = instrument_library()[tool_of(pose)].head;
+  r.depth_mm = head.length_mm == 0 ? std::sqrt(volume / (std::numbers::pi * head.start_radius_mm))
+                                   : head_cut_depth(tool_of(pose))(volume, -dot(r.normal, axis));
   r.normal_force_n = params_.force_n(r.depth_mm);
   r.force_n = r.normal * r.normal_force_n;
   r.shown_offset_mm = r.normal * r.depth_mm;
@@ -149,7 +149,7 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
 }
 
 Cut RaySampling::cut(const BrickGrid& bone) noexcept {
-  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.drill_on != 0);
+  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.pedal != 0);
   return head_.cut();
 }
 

@@ -1,8 +1,25 @@
 #include "osteo/haptics/servo.h"
 
+#include <algorithm>
+
+#include "osteo/base/error.h"
 #include "osteo/rt/loop.h"
 
 namespace osteo {
+
+Servo::Servo(HapticRenderer& renderer, std::span<Device* const> devices, Stream& stream, double rate_hz)
+    : renderer_(renderer),
+      devices_(devices.begin(), devices.end()),
+      stream_(stream),
+      dt_s_(1 / rate_hz),
+      pause_ticks_(static_cast<std::uint64_t>(std::max(1.0, std::round(kStrokePauseS * rate_hz)))) {
+  if (devices_.size() != renderer.hands())
+    throw Error(ExitCode::usage, std::to_string(devices_.size()) + " devices for " + std::to_string(renderer.hands()) + " hands",
+                "give the traits of each device in the setup: device, more_devices");
+}
+
+Servo::Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz)
+    : Servo(renderer, std::array<Device*, 1>{&device}, stream, rate_hz) {}
 
 bool Servo::post(const Handover* handover) noexcept {
   const Handover* none = nullptr;
@@ -15,8 +32,9 @@ void Servo::take_up(std::uint64_t tick) noexcept {
   SceneAction action = h->action;
   action.tick = tick;
   if (h->scene != nullptr) renderer_.show(h->scene);
+  if (h->settings != nullptr) renderer_.set(*h->settings);
   renderer_.hold(h->held);
-  if (action.is(ActionKind::soft_push)) renderer_.feel(action);
+  if (action.is(ActionKind::soft_push)) renderer_.push(action);
   stream_.publish(action);
   inbox_.store(nullptr, std::memory_order_release);
 }
@@ -38,20 +56,32 @@ void Servo::finish() noexcept {
   take_up(ticks());
 }
 
+bool Servo::active() const noexcept {
+  return std::any_of(devices_.begin(), devices_.end(), [tick = ticks()](const Device* d) { return d->active(tick); });
+}
+
 bool Servo::step(std::int64_t lateness_ns) noexcept {
+  if (!active()) return false;
   const std::uint64_t tick = ticks();
-  if (!device_.active(tick)) return false;
   const std::int64_t begin = monotonic_ns();
   take_up(tick);
-  auto [record, changes] = renderer_.step(device_.read(tick, dt_s_, force_n_));
-  record.tick = tick;
-  force_n_ = from_floats(record.force_n);
-  device_.feel(force_n_, renderer_.contact().normal, renderer_.stiffness_n_per_mm());
-  record.lateness_us = static_cast<float>(lateness_ns) / 1000;
-  record.work_us = static_cast<float>(monotonic_ns() - begin) / 1000;
-  removed_mm3_.store(removed_mm3() + static_cast<double>(record.removed_mm3), std::memory_order_relaxed);
+  std::array<DeviceSample, kMostHands> samples;
+  const std::size_t hands = devices_.size();
+  for (std::size_t h = 0; h < hands; ++h) samples[h] = devices_[h]->read(tick, dt_s_, force_n_[h]);
+  const auto [records, changes] = renderer_.step({samples.data(), hands});
+  double removed_mm3 = 0;
+  for (std::size_t h = 0; h < hands; ++h) {
+    TickRecord& r = records[h];
+    r.tick = tick;
+    force_n_[h] = from_floats(r.force_n);
+    devices_[h]->feel(force_n_[h], renderer_.contact(h).normal, renderer_.stiffness_n_per_mm(h));
+    r.lateness_us = static_cast<float>(lateness_ns) / 1000;
+    r.work_us = static_cast<float>(monotonic_ns() - begin) / 1000;
+    removed_mm3 += static_cast<double>(r.removed_mm3);
+  }
+  removed_mm3_.store(removed_mm3_.load(std::memory_order_relaxed) + removed_mm3, std::memory_order_relaxed);
   tell_stroke(tick, !changes.empty());
-  stream_.publish(record, changes);
+  stream_.publish(records, changes);
   ticks_.store(tick + 1, std::memory_order_relaxed);
   return true;
 }

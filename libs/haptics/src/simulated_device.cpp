@@ -54,7 +54,7 @@ DeviceSample SimulatedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n
     sample.position_mm[a] = static_cast<float>(q > 0 ? q * std::round(x_mm_[a] / q) : x_mm_[a]);
   }
   sample.axis = axis_;
-  sample.drill_on = drill_ ? 1 : 0;
+  sample.pedal = pedal_;
   sample.tool = tool_;
   return sample;
 }

@@ -53,17 +53,18 @@ const VibrationSpectrum& default_vibration() {
   return spectrum;
 }
 
-std::array<double, 2> Vibration::step(BurrKind kind, double pressed_n, double dt_s) noexcept {
+std::array<double, 2> Vibration::step(BurrKind kind, double pressed_n, double dt_s, double speed) noexcept {
   const auto index = static_cast<std::size_t>(kind);
   std::array<double, 2> force{};
   for (std::size_t i = 0; i < spectrum_.by_kind[index].size(); ++i) {
     const auto& peak = spectrum_.by_kind[index][i];
     double& phase = phase_[index][i];
-    phase += peak.frequency_hz * dt_s;
+    const double frequency_hz = speed * peak.frequency_hz;
+    phase += frequency_hz * dt_s;
     phase -= std::floor(phase);
     // Above what the loop can play without aliasing.
-    if (peak.frequency_hz * dt_s > 0.45) continue;
-    const double amplitude = peak.idle_n + peak.per_n * pressed_n;
+    if (frequency_hz * dt_s > 0.45) continue;
+    const double amplitude = speed * (peak.idle_n + peak.per_n * pressed_n);
     const portable::SinCos turn = portable::sin_cos_turns(phase);
     force[0] += amplitude * turn.cos;
     force[1] += amplitude * turn.sin;

@@ -45,7 +45,7 @@ Script make_default_script(const World& world, bool left, int tool, double secon
     throw Error(ExitCode::failed, "no bone was found on the patient's " + std::string(left ? "left" : "right") + " side",
                 "write a script of strokes for this case");
 
-  const double radius = burr_library()[static_cast<std::size_t>(tool)].diameter_mm / 2;
+  const double radius = instrument_library()[static_cast<std::size_t>(tool)].head.largest_radius_mm();
   Script script;
   script.tool = tool;
   script.axis = normalized(out + Vec3{0, 0.8, 0.6});

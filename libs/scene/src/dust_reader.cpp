@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 
 namespace osteo {
 
@@ -109,9 +109,15 @@ void DustReader::tick(const TickRecord& tick, std::span<const VoxelChange> chang
   const auto every = static_cast<std::uint64_t>(std::max(1.0, std::round(rate_hz_ / 100)));
   if (tick.tick % every != 0) return;
   const double seconds = static_cast<double>(every) / rate_hz_;
-  if (tick.device.tool < burr_library().size() && (tick.flags & kPlateInHand) == 0)
-    dust_->push(burr_library()[tick.device.tool].head(), from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
-                normalized(from_floats(tick.device.axis)));
+  if ((tick.flags & (kPlateInHand | kPoseInvalid)) == 0) {
+    const Instrument& held = instrument_of(tick.device.tool);
+    const Vec3 tip = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm);
+    const double amount = held.rate * seconds * tick.device.pedal / 255;
+    dust_->push(held.head, tip, normalized(from_floats(tick.device.axis)));
+    if (held.kind == InstrumentKind::sucker && amount > 0) dust_->suck(tip, held.reach_mm, amount);
+    if (held.kind == InstrumentKind::irrigator && amount > 0) dust_->irrigate(tip, held.reach_mm, std::min(1.0, amount));
+  }
+  if (tick.hand > 0) return;  // once for all hands
   const auto place = [](const SceneAction& a) { return Vec3{a.values[0], a.values[1], a.values[2]}; };
   if (sucker_.values[4] > 0) dust_->suck(place(sucker_), sucker_.values[3], sucker_.values[4] * seconds);
   if (water_.values[4] > 0) dust_->irrigate(place(water_), water_.values[3], std::min(1.0, water_.values[4] * seconds));

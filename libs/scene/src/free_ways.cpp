@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "osteo/base/portable_math.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/haptics/haptic_scene.h"
 
 namespace osteo {
@@ -92,11 +92,11 @@ HandWay put_at(const HandPose& pose) {
 
 }  // namespace
 
-ToolSkin skin_of_burr(std::size_t tool, bool head) {
+ToolSkin skin_of_instrument(std::size_t tool, bool head) {
   ToolSkin skin;
-  const Burr& burr = burr_library()[tool];
-  if (head) add_skin(burr.head(), 0.4, skin);
-  add_skin(burr.shaft(), 0.7, skin);
+  const Instrument& held = instrument_library()[tool];
+  if (head) add_skin(held.head, 0.4, skin);
+  add_skin(held.shaft, 0.7, skin);
   return skin;
 }
 

@@ -4,29 +4,53 @@
 #include <future>
 #include <thread>
 
+#include "osteo/base/error.h"
+
 namespace osteo {
-Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz)
-    : world_(std::move(world)), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, device, stream, rate_hz) {
-  scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup()));
+
+Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices, Stream& stream,
+                     double rate_hz)
+    : world_(std::move(world)), setup_(setup), renderer_(setup, anatomy, 1 / rate_hz), servo_(renderer_, devices, stream, rate_hz) {
+  scene_ = std::make_unique<HapticScene>(HapticScene::of(world_, setup_));
   renderer_.show(scene_.get());
 }
 
+Operation::Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz)
+    : Operation(std::move(world), setup, anatomy, std::array<Device*, 1>{&device}, stream, rate_hz) {}
+
 // Only when nothing posted before waits: the scene before the last is then nobody's any more.
 void Operation::hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene) {
-  handover_ = {action, nullptr, world_.held()};
+  handover_ = {action, nullptr, world_.held(), nullptr};
   if (scene) {
     old_scene_ = std::exchange(scene_, std::move(scene));
     handover_.scene = scene_.get();
   }
+  if (action.is(ActionKind::setting)) {
+    given_ = setup_.params;
+    handover_.settings = &given_;
+  }
   servo_.post(&handover_);
 }
 
-World::Effect Operation::act(const SceneAction& action, const Done& done, const World::ComponentsOf& components) {
+// The settings are the operation's own; all else is the world's.
+World::Effect Operation::apply(const SceneAction& action, const World::ComponentsOf& components) {
   World::Effect effect = world_.act(action, components);
+  if (!effect.done || !action.is(ActionKind::setting)) return effect;
+  try {
+    change_setting(setup_.params, action.item, action.values[0]);
+  } catch (const Error& e) {
+    effect.done = false;
+    effect.message = e.what();
+  }
+  return effect;
+}
+
+World::Effect Operation::act(const SceneAction& action, const Done& done, const World::ComponentsOf& components) {
+  World::Effect effect = apply(action, components);
   if (!effect.done) return effect;
   const ActionRow& row = row_of(action);
   // What the servo needs and what its followers need, side by side.
-  const auto scene_of = [&] { return std::make_unique<HapticScene>(HapticScene::of(world_, renderer_.setup(), scene_.get())); };
+  const auto scene_of = [&] { return std::make_unique<HapticScene>(HapticScene::of(world_, setup_, scene_.get())); };
   std::unique_ptr<HapticScene> scene;
   if (row.changes_touch) {
     auto beside = std::async(row.reads_bone && done ? std::launch::async : std::launch::deferred, scene_of);
@@ -37,6 +61,18 @@ World::Effect Operation::act(const SceneAction& action, const Done& done, const 
   return effect;
 }
 
+// A distance map that was not wanted before is made of the bone as it is.
+bool Operation::needs_hold(const SceneAction& action) const {
+  if (!action.is(ActionKind::setting)) return row_of(action).reads_bone;
+  HapticSetup next = setup_;
+  try {
+    change_setting(next.params, action.item, action.values[0]);
+  } catch (const Error&) {
+    return false;  // apply() refuses it
+  }
+  return scene_->needs_bone_held(next);
+}
+
 std::optional<World::Effect> Operation::act_live(const SceneAction& action, const std::function<bool()>& running,
                                                  const std::function<void()>& held, const Done& done,
                                                  const World::ComponentsOf& components) {
@@ -45,7 +81,7 @@ std::optional<World::Effect> Operation::act_live(const SceneAction& action, cons
   };
   wait();
   if (!servo_.taken()) return std::nullopt;
-  const bool hold = row_of(action).reads_bone;
+  const bool hold = needs_hold(action);
   if (hold) {
     act(SceneAction::plain(ActionKind::hold));
     wait();

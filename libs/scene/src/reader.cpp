@@ -51,13 +51,14 @@ std::size_t ReaderHub::drain() {
         ticks_lost_ += record.tick - *next_tick_;
         lost = true;
       }
-      next_tick_ = record.tick + 1;
+      // All hands of a tick are there or none.
+      next_tick_ = std::max(*next_tick_, record.tick + 1);
+      latest_[record.hand] = record;
       for (; !actions_.empty() && actions_.front().tick <= record.tick; actions_.pop_front()) tell(actions_.front());
       const std::size_t changed = std::min<std::size_t>(record.voxels_changed, got - used);
       for (Reader* const r : readers_) r->tick(record, {changes_.data() + used, changed});
       used += changed;
     }
-    latest_ = ticks_[n - 1];
     total += n;
   }
   due = std::min(due, actions_.size());

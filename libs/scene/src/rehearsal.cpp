@@ -12,12 +12,30 @@
 
 namespace osteo {
 
+namespace {
+
+std::vector<std::unique_ptr<Device>> one(std::unique_ptr<Device> device) {
+  std::vector<std::unique_ptr<Device>> all;
+  all.push_back(std::move(device));
+  return all;
+}
+std::vector<Device*> pointers(const std::vector<std::unique_ptr<Device>>& devices) {
+  std::vector<Device*> all;
+  for (const auto& d : devices) all.push_back(d.get());
+  return all;
+}
+
+}  // namespace
+
 Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context)
-    : device_(std::move(device)),
+    : Rehearsal(std::move(world), one(std::move(device)), options, context) {}
+
+Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options, const Context& context)
+    : devices_(std::move(devices)),
       options_(options),
       voxel_mm3_(world.bodies().front().body->bone.frame().voxel_volume_mm3()),
       finest_voxel_mm_(world.finest_voxel_mm()),
-      operation_(std::move(world), options.haptics, options.anatomy, *device_, stream_, options.rate_hz),
+      operation_(std::move(world), options.haptics, options.anatomy, pointers(devices_), stream_, options.rate_hz),
       hub_(stream_.add_reader(), operation_.world()),
       timed_(options.actions.begin(), options.actions.end()) {
   if (!options_.session_file.empty()) {
@@ -25,6 +43,7 @@ Rehearsal::Rehearsal(World world, std::unique_ptr<Device> device, const Rehearsa
     header.program_version = program_version();
     header.bone_hash = operation_.world().hash();
     header.rate_hz = options_.rate_hz;
+    header.hands = static_cast<std::uint32_t>(options_.haptics.hands());
     header.haptics = options_.haptics;
     header.dust = options_.follow.dust;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
@@ -51,7 +70,7 @@ bool Rehearsal::running() const {
 std::size_t Rehearsal::drain() {
   const std::size_t total = hub_.drain();
   if (total == 0) return 0;
-  latest_.store(hub_.latest());
+  for (std::size_t hand = 0; hand < devices_.size(); ++hand) latest_[hand].store(hub_.latest(hand));
   if (options_.follow.pieces) pieces_ = static_cast<int>(readers_->large_pieces().size());
   return total;
 }
@@ -106,10 +125,10 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
 std::optional<SceneAction> Rehearsal::move_soft() {
   const std::uint64_t tick = operation_.ticks();
   const TickRecord& now = hub_.latest();
-  if (!options_.soft || tick < soft_tick_ || tick == 0 || now.device.tool >= burr_library().size()) return std::nullopt;
+  if (!options_.soft || tick < soft_tick_ || tick == 0) return std::nullopt;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
   const auto push = options_.soft->update(
-      {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.device.drill_on != 0});
+      {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.speed_rpm > 0});
   tissue_mm3_ = options_.soft->cut_off_mm3();
   return push;
 }
@@ -143,7 +162,10 @@ std::string Rehearsal::trouble() const {
   if (s.ticks_lost > 0) return "the disk does not keep up: " + std::to_string(s.ticks_lost) + " ticks are not recorded";
   if (s.notes_lost > 0) return std::to_string(s.notes_lost) + " notes (camera, marks) are not recorded: they came too fast";
   if (s.behind_s > 3) return "the disk is " + std::to_string(std::lround(s.behind_s)) + " s behind; nothing is lost yet";
-  return device_->trouble();
+  for (const auto& device : devices_) {
+    if (std::string text = device->trouble(); !text.empty()) return text;
+  }
+  return {};
 }
 
 // What it throws is told by stop(); a scene that nobody follows is no use to a hand, so the servo ends too.
@@ -220,11 +242,11 @@ bool Rehearsal::run_on(const Context& context) {
   for (;;) {
     std::unique_lock lock(mutex_, std::defer_lock);
     // Until the servo has taken it up: who joins meanwhile finds nothing on its way.
-    if (!timed_.empty() && timed_.front().tick <= operation_.ticks() && device_->active(operation_.ticks())) {
+    if (!timed_.empty() && timed_.front().tick <= operation_.ticks() && operation_.active()) {
       lock.lock();
       perform(timed_.front(), false);
       timed_.pop_front();
-    } else if (options_.soft && operation_.ticks() >= soft_tick_ && device_->active(operation_.ticks())) {
+    } else if (options_.soft && operation_.ticks() >= soft_tick_ && operation_.active()) {
       // One action a tick: what was to be done comes first.
       lock.lock();
       drain();
@@ -292,8 +314,9 @@ RehearsalSummary Rehearsal::finish() {
   s.unusable_poses = readers_->tools.unusable_poses();
   if (loop_) s.loop = loop_->stats();
   for (const std::uint8_t tool : readers_->tools.burrs_used()) {
-    const Burr& burr = burr_library()[std::min<std::size_t>(tool, burr_library().size() - 1)];
-    if (std::string text = too_small_for_voxels(burr, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
+    const Burr* const burr = instrument_of(tool).as_burr();
+    if (burr == nullptr) continue;
+    if (std::string text = too_small_for_voxels(*burr, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
   }
   if (const std::uint64_t n = readers_->tools.ticks_without_room(); n > 0)
     s.warnings.push_back("in " + std::to_string(n) +
@@ -315,6 +338,11 @@ RehearsalSummary Rehearsal::finish() {
   if (failure_) std::rethrow_exception(failure_);
   summary_ = s;
   return s;
+}
+
+HapticsParams Rehearsal::settings() const {
+  const std::lock_guard lock(mutex_);
+  return operation_.setup().params;
 }
 
 void Rehearsal::look(const std::function<void(const World&, SceneReaders&)>& f) {

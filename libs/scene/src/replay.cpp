@@ -63,8 +63,9 @@ class Replaying {
         from_changes_(start.copy()),
         from_checkpoints_(start.copy()),
         checkpoints_(session.checkpoints()),
+        hands_(session.header().haptics.hands()),
         reader_(stream_.add_reader()),
-        operation_(std::move(start), session.header().haptics, anatomy, hand_, stream_, session.header().rate_hz),
+        operation_(std::move(start), session.header().haptics, anatomy, devices(), stream_, session.header().rate_hz),
         hub_(stream_.add_reader(), operation_.world()),
         // Dust follows from the stream, so it has to come out the same as well.
         readers_(operation_.world(), {false, false, session.header().dust}, session.header().rate_hz, context) {
@@ -79,11 +80,15 @@ class Replaying {
     if (changes_apply_) apply(part, from_changes_);
     result_.actions += part.actions.size();
     if (repeating_) actions_.insert(actions_.end(), part.actions.begin(), part.actions.end());
-    for (const TickRecord& t : part.ticks) {
-      if (repeating_)
-        repeat(t);
-      else
-        result_.removed_mm3 += static_cast<double>(t.removed_mm3);
+    // A frame holds whole ticks.
+    const std::span<const TickRecord> records(part.ticks);
+    for (std::size_t first = 0; first + hands_.size() <= records.size(); first += hands_.size()) {
+      const auto tick = records.subspan(first, hands_.size());
+      if (repeating_) {
+        repeat(tick);
+      } else {
+        for (const TickRecord& t : tick) result_.removed_mm3 += static_cast<double>(t.removed_mm3);
+      }
       ++result_.ticks;
     }
     if (part.checkpoint && repeating_) compare_at(*part.checkpoint);
@@ -125,6 +130,12 @@ class Replaying {
   void differ_in_bone() { differ("the recorded voxel changes give another bone than the recorded poses"); }
   [[nodiscard]] double seconds(std::uint64_t tick) const { return static_cast<double>(tick) / session_.header().rate_hz; }
 
+  std::vector<Device*> devices() {
+    std::vector<Device*> all;
+    for (RecordedHand& h : hands_) all.push_back(&h);
+    return all;
+  }
+
   // The next whose tick has come.
   void act() {
     const SceneAction action = actions_.front();
@@ -152,26 +163,31 @@ class Replaying {
     hub_.end(result_.ticks_repeated);
   }
 
-  void repeat(const TickRecord& recorded) {
-    if (recorded.tick % 256 == 0) {
-      context_.progress(0.9 * static_cast<double>(result_.ticks) / static_cast<double>(session_.outline().tick_records), "replay");
+  // The records of all hands of a tick.
+  void repeat(std::span<const TickRecord> recorded) {
+    if (recorded.front().tick % 256 == 0) {
+      const double ticks = static_cast<double>(session_.outline().tick_records) / static_cast<double>(hands_.size());
+      context_.progress(0.9 * static_cast<double>(result_.ticks) / ticks, "replay");
       hub_.drain();
     }
     // At most one a tick is done; the servo's own come with its step.
-    if (!actions_.empty() && actions_.front().tick <= recorded.tick && !row_of(actions_.front()).by_servo) act();
-    hand_.sample = recorded.device;
+    if (!actions_.empty() && actions_.front().tick <= recorded.front().tick && !row_of(actions_.front()).by_servo) act();
+    for (std::size_t h = 0; h < recorded.size(); ++h) hands_[h].sample = recorded[h].device;
     operation_.step(0);
-    TickRecord now;
-    reader_.ticks.pop({&now, 1});
+    std::array<TickRecord, kMostHands> now;
+    reader_.ticks.pop({now.data(), recorded.size()});
     while (reader_.changes.pop(changes_) > 0) {
     }
     for (SceneAction done; reader_.actions.pop({&done, 1}) > 0;) {
       if (row_of(done).by_servo) own_.emplace_back(done.kind, done.tick);
     }
-    while (!actions_.empty() && actions_.front().tick <= recorded.tick && row_of(actions_.front()).by_servo) act();
-    if (const RecordField* const f = first_difference(session_.outline().tick_fields, &now, &recorded))
-      differ("tick " + std::to_string(recorded.tick) + " came out differently (" + std::string(f->name) + ")");
-    result_.removed_mm3 += static_cast<double>(now.removed_mm3);
+    while (!actions_.empty() && actions_.front().tick <= recorded.front().tick && row_of(actions_.front()).by_servo) act();
+    for (std::size_t h = 0; h < recorded.size(); ++h) {
+      if (const RecordField* const f = first_difference(session_.outline().tick_fields, &now[h], &recorded[h]))
+        differ("tick " + std::to_string(recorded[h].tick) + (recorded.size() > 1 ? ", hand " + std::to_string(h) + "," : "") +
+               " came out differently (" + std::string(f->name) + ")");
+      result_.removed_mm3 += static_cast<double>(now[h].removed_mm3);
+    }
     ++result_.ticks_repeated;
   }
 
@@ -203,7 +219,7 @@ class Replaying {
   const Gap* known_until_;
   World from_changes_, from_checkpoints_;  // the second way and the third
   SessionReader::Parts checkpoints_;
-  RecordedHand hand_;
+  std::vector<RecordedHand> hands_;
   Stream stream_;
   StreamReader& reader_;
   Operation operation_;

@@ -67,8 +67,8 @@ std::vector<std::string> doubts_about(const Script& script, const World& world, 
                      format_number(std::round(box.hi.x)) + ", " + format_number(std::round(box.hi.y)) + ", " +
                      format_number(std::round(box.hi.z)));
   }
-  const auto cleans = [](const Script::Deed& d) { return row_of(d.action).moves_dust; };
-  if (!dust && std::any_of(script.deeds.begin(), script.deeds.end(), cleans))
+  const auto cleans = [](const Script::TimedAction& d) { return row_of(d.action).moves_dust; };
+  if (!dust && std::any_of(script.actions.begin(), script.actions.end(), cleans))
     doubts.emplace_back("the script sucks off or washes away dust, but there is none: add --dust");
   return doubts;
 }

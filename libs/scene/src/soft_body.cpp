@@ -6,7 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/io/tet_io.h"
 #include "osteo/tets/skin.h"
@@ -90,11 +90,12 @@ struct SoftBody::Impl {
 
 // By force and time; the voxel whose corners lie deepest in the burr goes first.
 void SoftBody::Impl::cut(const SoftTool& tool, double force_n) {
-  const Burr& burr = burr_library()[tool.burr];
-  budget_mm3 += std::min(force_n * burr.rate_mm3_per_s_per_n * kEasierThanBone, kMostMm3PerS) / kUpdatesPerS;
+  const Burr* const burr = instrument_of(tool.tool).as_burr();
+  if (burr == nullptr) return;
+  budget_mm3 += std::min(force_n * burr->rate_mm3_per_s_per_n * kEasierThanBone, kMostMm3PerS) / kUpdatesPerS;
   budget_mm3 = std::min(budget_mm3, 8 * voxel_mm3);
   if (budget_mm3 < voxel_mm3) return;
-  const ToolShape shape(burr.head(), tool.at_mm, tool.axis);
+  const ToolShape shape(burr->head(), tool.at_mm, tool.axis);
   const auto x = dynamics.positions_mm();
   const RigidShape::Ball near = shape.bounds();
   std::vector<std::pair<double, std::uint32_t>> met;  // depth, voxel
@@ -175,7 +176,7 @@ void SoftBody::meet(const World* world) {
 
 std::optional<SceneAction> SoftBody::update(const SoftTool& tool) {
   Impl& m = *impl_;
-  m.dynamics.set_tool({std::make_shared<ToolShape>(burr_library()[tool.burr].head(), tool.at_mm, tool.axis), kToolStiffness});
+  m.dynamics.set_tool({std::make_shared<ToolShape>(instrument_of(tool.tool).head, tool.at_mm, tool.axis), kToolStiffness});
   const Vec3 force = m.dynamics.step(m.steps);
   const double size = length(force);
   const bool pushes = size > 1e-4;

@@ -16,7 +16,7 @@ Recorder::Recorder(StreamReader& reader, std::unique_ptr<SessionSink> sink, cons
       writer_(std::unique_ptr<SessionSink>(backlog_), header),
       most_waiting_(most_waiting_bytes),
       frame_ticks_(std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(kFrameS * header.rate_hz)))),
-      ticks_buffer_(256),
+      ticks_buffer_(20 * 12),  // whole ticks, whether of 1, 2, 3 or 4 hands
       changes_buffer_(1 << 20) {}
 
 Recorder::~Recorder() {
@@ -96,7 +96,7 @@ void Recorder::take(std::size_t n, std::size_t got) {
       put_up_to(t);
       lose(next_tick_, r.tick - next_tick_, true);
     }
-    if (const std::uint64_t dropped = reader_.actions_dropped.load(std::memory_order_relaxed); dropped > actions_dropped_) {
+    if (const std::uint64_t dropped = reader_.actions_dropped.load(std::memory_order_relaxed); r.hand == 0 && dropped > actions_dropped_) {
       put_up_to(t);
       lose(r.tick, 0, true);
       actions_dropped_ = dropped;
@@ -121,7 +121,7 @@ void Recorder::put(std::size_t begin, std::size_t end, std::span<const VoxelChan
     frame_.changes.insert(frame_.changes.end(), changes.begin(), changes.end());
     return;
   }
-  lose(ticks_buffer_[begin].tick, end - begin, false);
+  lose(ticks_buffer_[begin].tick, ticks_buffer_[end - 1].tick + 1 - ticks_buffer_[begin].tick, false);
   Meanwhile& now = meanwhile();
   for (const VoxelChange& c : changes) now.changes[c.voxel] = c.density;
 }

@@ -11,8 +11,9 @@
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
 #include "osteo/base/portable_math.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/bone/plates.h"
+#include "osteo/haptics/haptic_setup.h"
 
 namespace osteo {
 namespace {
@@ -70,10 +71,21 @@ struct Point {
   double t_s = 0;
   Triple at_mm{};
   bool drill = true;
+  double pedal = 1;
   static void describe(Point& p, auto& visit) {
     visit({"t_s", "when the hand is there", "s", 0, kLongestS, true}, p.t_s);
-    visit({"at_mm", "where the hand wants the burr, LPS", "mm", -kFarMm, kFarMm, true}, p.at_mm);
-    visit({"drill", "it turns from here to the next waypoint"}, p.drill);
+    visit({"at_mm", "where the hand wants the tip, LPS", "mm", -kFarMm, kFarMm, true}, p.at_mm);
+    visit({"drill", "the pedal is down from here to the next waypoint: it drills, sucks or rinses"}, p.drill);
+    visit({"pedal", "how far down", "", 0, 1}, p.pedal);
+  }
+};
+
+struct HandPart {
+  std::string instrument;
+  Triple axis{0, 0, 1};
+  static void describe(HandPart& p, auto& visit) {
+    visit({"instrument", "by name, as sucker 8 Fr or cutting 4 mm", "", 0, 0, true}, p.instrument);
+    visit({"axis", "from the tip to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
   }
 };
 
@@ -200,7 +212,14 @@ struct Undo {
   static void describe(Undo&, auto&) {}
 };
 
-using Forms = std::tuple<Saw, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Undo>;
+// Its keys are the names of the haptic settings, which are declared where they belong.
+struct Set {
+  static constexpr const char *kName = "set", *kHelp = "haptic settings that have other values from here on";
+  HapticsParams params;
+  static void describe(Set& p, auto& visit) { HapticsParams::describe(p.params, visit); }
+};
+
+using Forms = std::tuple<Saw, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Undo, Set>;
 
 template <class T>
 std::vector<FieldRef> fields_in(T& part) {
@@ -217,7 +236,7 @@ class ScriptReader {
   void read() {
     const JsonValue& root = file_.root();
     Head head;
-    const std::vector<std::string> besides{"burr", "camera", "waypoints", "actions"};
+    const std::vector<std::string> besides{"burr", "camera", "waypoints", "actions", "hands"};
     file_.read(root, "", fields_in(head), besides);
     script_.axis = direction(root, "", "axis", head.axis);
     BurrPart burr;
@@ -229,18 +248,16 @@ class ScriptReader {
       file_.read(*c, "camera", fields_in(camera));
       script_.camera = Script::Camera{vec(camera.centre_mm), camera.radius_mm, direction(*c, "camera", "eye", camera.eye)};
     }
-    const JsonValue& waypoints = needed(root, "waypoints", JsonValue::Kind::list, "[{\"t_s\": 0, \"at_mm\": [80, 24, -26]}, ...]");
+    const JsonValue& waypoints = read_waypoints(root, "", script_);
+    read_hands(root);
     int number = 0;
-    for (const JsonValue& w : waypoints.items) waypoint(w, "waypoint " + std::to_string(++number));
-    if (script_.waypoints.empty()) throw file_.wrong(waypoints, "there are no waypoints");
-    number = 0;
     const JsonValue* const actions = root.find("actions");
     if (actions != nullptr && actions->kind != JsonValue::Kind::list) throw file_.wrong(*actions, "\"actions\" must be a list");
     for (std::size_t a = 0; actions != nullptr && a < actions->items.size(); ++a) {
       const std::string where = "action " + std::to_string(++number);
-      const std::size_t before = script_.deeds.size();
+      const std::size_t before = script_.actions.size();
       action(actions->items[a], where);
-      if (before > 0 && script_.deeds[before].t_s < script_.deeds[before - 1].t_s)
+      if (before > 0 && script_.actions[before].t_s < script_.actions[before - 1].t_s)
         throw file_.wrong(actions->items[a], where + ": it begins before the one above has ended",
                           "actions stand in the order of their times");
     }
@@ -285,28 +302,59 @@ class ScriptReader {
     return {{x, cross(z, x), z}};
   }
 
-  void waypoint(const JsonValue& w, const std::string& where) {
+  const JsonValue& read_waypoints(const JsonValue& of, const std::string& where, Strokes& hand) {
+    const JsonValue& waypoints = needed(of, "waypoints", JsonValue::Kind::list, "[{\"t_s\": 0, \"at_mm\": [80, 24, -26]}, ...]");
+    int number = 0;
+    for (const JsonValue& w : waypoints.items) waypoint(w, where + "waypoint " + std::to_string(++number), hand);
+    if (hand.waypoints.empty()) throw file_.wrong(waypoints, where + "there are no waypoints");
+    return waypoints;
+  }
+  // Those besides the one with the burr.
+  void read_hands(const JsonValue& root) {
+    const JsonValue* const hands = root.find("hands");
+    if (hands == nullptr) return;
+    if (hands->kind != JsonValue::Kind::list) throw file_.wrong(*hands, "\"hands\" must be a list");
+    if (hands->items.size() >= kMostHands)
+      throw file_.wrong(*hands, "there are " + std::to_string(hands->items.size()) + " hands besides the first",
+                        "at most " + std::to_string(kMostHands - 1));
+    int number = 0;
+    for (const JsonValue& h : hands->items) {
+      const std::string where = "hand " + std::to_string(++number);
+      HandPart part;
+      const std::vector<std::string> besides{"waypoints"};
+      file_.read(h, where, fields_in(part), besides);
+      Strokes strokes;
+      strokes.tool = located(*h.find("instrument"), where, [&] { return instrument_index(part.instrument); });
+      strokes.axis = direction(h, where, "axis", part.axis);
+      static_cast<void>(read_waypoints(h, where + ", ", strokes));
+      script_.more_hands.push_back(std::move(strokes));
+    }
+  }
+
+  void waypoint(const JsonValue& w, const std::string& where, Strokes& hand) {
     if (const JsonValue* const c = w.find("cavity")) {
       When when;
       const std::vector<std::string> besides{"cavity"};
       file_.read(w, where, fields_in(when), besides);
       Cavity cavity;
       file_.read(*c, where + ", cavity", fields_in(cavity));
-      add_cavity(when.t_s, cavity, direction(*c, where + ", cavity", "towards", cavity.towards), w, where);
+      add_cavity(when.t_s, cavity, direction(*c, where + ", cavity", "towards", cavity.towards), w, where, hand);
     } else {
       Point p;
       file_.read(w, where, fields_in(p));
-      must_rise(p.t_s, w, where);
-      script_.waypoints.push_back({p.t_s, vec(p.at_mm), p.drill});
+      must_rise(p.t_s, w, where, hand);
+      if (!p.drill && w.find("pedal") != nullptr && p.pedal > 0)
+        throw file_.wrong(*w.find("pedal"), where + ": the pedal is down and \"drill\" is false", "leave out one of the two");
+      hand.waypoints.push_back({p.t_s, vec(p.at_mm), p.drill, p.pedal});
     }
   }
-  void must_rise(double t_s, const JsonValue& w, const std::string& where) {
-    if (!script_.waypoints.empty() && !(t_s > script_.waypoints.back().t_s))
-      throw file_.wrong(w, where + ": times must rise, but the one above ends at " + format_number(script_.waypoints.back().t_s) + " s");
+  void must_rise(double t_s, const JsonValue& w, const std::string& where, const Strokes& hand) {
+    if (!hand.waypoints.empty() && !(t_s > hand.waypoints.back().t_s))
+      throw file_.wrong(w, where + ": times must rise, but the one above ends at " + format_number(hand.waypoints.back().t_s) + " s");
   }
   // Circles that open and close between the middle and the rim of a bowl, a little deeper each time.
-  void add_cavity(double begin_s, const Cavity& c, Vec3 in, const JsonValue& w, const std::string& where) {
-    must_rise(begin_s, w, where);
+  void add_cavity(double begin_s, const Cavity& c, Vec3 in, const JsonValue& w, const std::string& where, Strokes& hand) {
+    must_rise(begin_s, w, where, hand);
     const Vec3 u = any_perpendicular(in), v = cross(in, u);
     constexpr double kStep = 0.05, kSwaysPerS = 0.25;
     for (double t = 0; t < c.over_s; t += kStep) {
@@ -315,7 +363,7 @@ class ScriptReader {
       const portable::SinCos turn = portable::sin_cos_turns(c.turns_per_s * t);
       // A bowl: less deep towards its rim.
       const double depth = c.depth_mm * share * (1 - 0.4 * (circle / c.radius_mm) * (circle / c.radius_mm));
-      script_.waypoints.push_back({begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
+      hand.waypoints.push_back({begin_s + t, vec(c.centre_mm) + in * depth + u * (circle * turn.cos) + v * (circle * turn.sin), true});
     }
   }
 
@@ -347,7 +395,7 @@ class ScriptReader {
         Forms());
   }
 
-  void add(double t, const SceneAction& a) { script_.deeds.push_back({t, a}); }
+  void add(double t, const SceneAction& a) { script_.actions.push_back({t, a}); }
   template <class F>
   void steps(double t, double seconds, F&& at) {
     const int n = std::max(1, static_cast<int>(std::lround(seconds * kStepsPerS)));
@@ -424,6 +472,15 @@ class ScriptReader {
   }
   void act(double t, const Undo&, const JsonValue&, const std::string&) { add(t, SceneAction::plain(ActionKind::undo)); }
 
+  // Each is an action of its own, in the order of the settings; as they are in the file, so that what is said of none is left alone.
+  void act(double t, const Set& s, const JsonValue& j, const std::string& where) {
+    if (j.members.empty()) throw file_.wrong(j, where + ": it names no setting");
+    for (std::size_t n = 0; n < setting_names().size(); ++n) {
+      if (j.find(setting_names()[n]) != nullptr)
+        add(t, SceneAction::setting(static_cast<std::uint32_t>(n), setting_value(static_cast<int>(n), s.params)));
+    }
+  }
+
   const JsonFile& file_;
   Script& script_;
   std::map<std::uint32_t, Place> places_;
@@ -446,15 +503,6 @@ ordered_json object_schema() {
 
 }  // namespace
 
-std::vector<SceneAction> actions_of(const Script& script, double rate_hz) {
-  std::vector<SceneAction> actions;
-  for (const Script::Deed& d : script.deeds) {
-    actions.push_back(d.action);
-    actions.back().tick = d.tick(rate_hz);
-  }
-  return actions;
-}
-
 Script load_script(const fs::path& path) {
   Script script;
   const JsonFile file(read_text(path), path.string());
@@ -471,8 +519,10 @@ std::string script_json(const Script& script) {
                {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(burr.shape)]}};
   j["axis"] = {script.axis.x, script.axis.y, script.axis.z};
   j["waypoints"] = ordered_json::array();
-  for (const auto& w : script.waypoints)
+  for (const auto& w : script.waypoints) {
     j["waypoints"].push_back({{"t_s", w.t_s}, {"at_mm", {w.at_mm.x, w.at_mm.y, w.at_mm.z}}, {"drill", w.drill_on}});
+    if (w.drill_on && w.pedal != 1) j["waypoints"].back()["pedal"] = w.pedal;
+  }
   return j.dump(1) + "\n";
 }
 
@@ -486,6 +536,10 @@ std::string script_schema() {
   cavity["properties"]["cavity"] = object_schema<Cavity>();
   cavity["required"].push_back("cavity");
   s["properties"]["waypoints"] = {{"type", "array"}, {"minItems", 1}, {"items", {{"oneOf", {object_schema<Point>(), cavity}}}}};
+  ordered_json hand = object_schema<HandPart>();
+  hand["properties"]["waypoints"] = s["properties"]["waypoints"];
+  hand["required"].push_back("waypoints");
+  s["properties"]["hands"] = {{"type", "array"}, {"maxItems", kMostHands - 1}, {"items", hand}};
   ordered_json any = ordered_json::array();
   const auto add = [&]<class F>(const F&) {
     ordered_json entry = object_schema<When>();

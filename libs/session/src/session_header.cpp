@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
-#include "osteo/bone/burr.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/bone/plates.h"
 
 namespace osteo {
@@ -36,11 +36,15 @@ ordered_json haptics_json(const HapticSetup& h) {
   HapticSetup copy = h;
   ordered_json j;
   j["params"] = fields_json(fields_of<HapticsParams>(copy.params));
-  j["device"] = {{"damping_n_s_per_m", h.device.damping_n_s_per_m},
-                 {"delay_s", h.device.delay_s},
-                 {"encoder_mm", h.device.encoder_mm},
-                 {"max_force_n", h.device.max_force_n},
-                 {"max_stiffness_n_per_mm", h.device.max_stiffness_n_per_mm}};
+  j["devices"] = ordered_json::array();  // of each hand
+  for (std::size_t hand = 0; hand < h.hands(); ++hand) {
+    const DeviceTraits& d = h.device_of(hand);
+    j["devices"].push_back({{"damping_n_s_per_m", d.damping_n_s_per_m},
+                            {"delay_s", d.delay_s},
+                            {"encoder_mm", d.encoder_mm},
+                            {"max_force_n", d.max_force_n},
+                            {"max_stiffness_n_per_mm", d.max_stiffness_n_per_mm}});
+  }
   j["tool_methods"] = ordered_json::array();
   for (const auto& [tool, method] : h.tool_methods) j["tool_methods"].push_back({tool, static_cast<int>(method)});
   j["hardness"] = h.hardness.value_or(false);
@@ -69,8 +73,13 @@ HapticSetup setup_of(const ordered_json& j, std::vector<std::string>& unknown) {
       unknown.push_back(key + " = " + value.get<std::string>());
     }
   }
-  const auto& d = j.at("device");
-  h.device = {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")};
+  for (const auto& d : j.at("devices"))
+    h.more_devices.push_back(
+        {d.at("damping_n_s_per_m"), d.at("delay_s"), d.at("encoder_mm"), d.at("max_force_n"), d.at("max_stiffness_n_per_mm")});
+  if (!h.more_devices.empty()) {
+    h.device = h.more_devices.front();
+    h.more_devices.erase(h.more_devices.begin());
+  }
   for (const auto& t : j.at("tool_methods")) {
     const int method = t.at(1);
     if (method < 0 || method >= static_cast<int>(EnumNames<ContactMethod>::values.size()))
@@ -88,15 +97,28 @@ HapticSetup setup_of(const ordered_json& j, std::vector<std::string>& unknown) {
   return h;
 }
 
-ordered_json burrs_json() {
+ordered_json instruments_json() {
   ordered_json j = ordered_json::array();
-  for (const Burr& b : burr_library())
-    j.push_back({{"name", b.name()},
-                 {"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(b.kind)]},
-                 {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(b.shape)]},
-                 {"diameter_mm", b.diameter_mm},
-                 {"rate_mm3_per_s_per_n", b.rate_mm3_per_s_per_n},
-                 {"falloff_mm3_per_s_per_n_per_rad", b.falloff_mm3_per_s_per_n_per_rad}});
+  const auto shape = [](const RoundCone& c) -> ordered_json {
+    return {{"start_mm", c.start_mm}, {"length_mm", c.length_mm}, {"start_radius_mm", c.start_radius_mm}, {"end_radius_mm", c.end_radius_mm}};
+  };
+  for (const Instrument& i : instrument_library()) {
+    ordered_json one{{"name", i.name},
+                     {"kind", EnumNames<InstrumentKind>::values[static_cast<std::size_t>(i.kind)]},
+                     {"head", shape(i.head)},
+                     {"shaft", shape(i.shaft)}};
+    if (const Burr* const b = i.as_burr()) {
+      one["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(b->kind)]},
+                     {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(b->shape)]},
+                     {"diameter_mm", b->diameter_mm},
+                     {"rate_mm3_per_s_per_n", b->rate_mm3_per_s_per_n},
+                     {"falloff_mm3_per_s_per_n_per_rad", b->falloff_mm3_per_s_per_n_per_rad}};
+    } else if (i.rate > 0) {
+      one["rate"] = i.rate;
+      one["reach_mm"] = i.reach_mm;
+    }
+    j.push_back(one);
+  }
   return j;
 }
 
@@ -183,7 +205,7 @@ std::string header_json(const SessionHeader& h) {
   j["records"]["note"] = {{"part", kNotesPart}, {"text", true}, {"meaning", "a line of JSON each: tick, kind, value"}};
   for (std::uint32_t kind = 1; name_of(static_cast<ActionKind>(kind)) != "?"; ++kind)
     j["actions"][std::to_string(kind)] = name_of(static_cast<ActionKind>(kind));
-  j["burrs"] = burrs_json();
+  j["instruments"] = instruments_json();
   j["plates"] = plates_json();
   j["haptics"] = haptics_json(h.haptics);
   return j.dump();
@@ -209,7 +231,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
   if (h.kernels != Kernels{})
     say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
-  if (h.hands != 1) say_not_replayable(o, "it has " + std::to_string(h.hands) + " hands");
+  if (h.hands > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.hands) + " hands");
   for (const auto& [kind, record] : j.at("records").items()) tables.push_back(table_of(kind, record, name, o));
   const auto has = [&](std::uint32_t part) {
     return std::any_of(tables.begin(), tables.end(), [&](const FileTable& t) { return t.part == part; });
@@ -226,9 +248,11 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
     }
   }
   for (const auto& [kind, action] : j.at("actions").items()) o.action_names[static_cast<std::uint32_t>(std::stoul(kind))] = action;
-  for (const auto& b : j.at("burrs")) o.tools.push_back(b.at("name"));
+  for (const auto& i : j.at("instruments")) o.tools.push_back(i.at("name"));
   std::vector<std::string> unknown;
   h.haptics = setup_of(j.at("haptics"), unknown);
+  if (h.haptics.hands() != h.hands) throw Error(ExitCode::corrupt, name + " tells of other devices than hands");
+  for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {
     o.newer.push_back("the setting '" + u + "'");
     say_not_replayable(o, "this version has no setting '" + u + "'");

@@ -326,7 +326,7 @@ bool SessionReader::Parts::State::next_of_frame() {
       if (scene_only) continue;
       read(ticks);
       for (const TickRecord& t : ticks) {
-        if (t.tick != next_tick || t.tick >= entry->end_tick) file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
+        if (t.tick != next_tick || t.hand != hand || t.tick >= entry->end_tick) file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
         if (++hand == file.outline.header.hands) {
           hand = 0;
           ++next_tick;
@@ -338,6 +338,12 @@ bool SessionReader::Parts::State::next_of_frame() {
       part.changes = changes;
     } else if (table->part == action_record_table().part) {
       read(actions);
+      for (SceneAction& a : actions) {
+        if (!a.is(ActionKind::setting)) continue;
+        const auto& names = file.outline.setting_names;
+        const int here = a.item < names.size() ? setting_number(names[a.item]) : -1;
+        a.item = here < 0 ? SceneAction::kNobody : static_cast<std::uint32_t>(here);
+      }
       part.actions = actions;
     } else if (table->part == kNotesPart && table->text) {
       if (scene_only) continue;

@@ -20,6 +20,7 @@
 #include <vtkRenderer.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -133,16 +134,19 @@ class RehearsalWindow {
 
   void make_scene() {
     set_up_scene(renderer_);
-    for (const auto& [actor, mapper] : {std::pair<vtkActor*, vtkPolyDataMapper*>{burr_, burr_mapper_}, {shaft_, shaft_mapper_}}) {
-      actor->SetMapper(mapper);
-      actor->SetUserMatrix(tool_matrix_);
-      renderer_->AddActor(actor);
+    for (DrawnHand& hand : drawn_) {
+      for (const auto& [actor, mapper] :
+           {std::pair<vtkActor*, vtkPolyDataMapper*>{hand.head, hand.head_mapper}, {hand.shaft, hand.shaft_mapper}}) {
+        actor->SetMapper(mapper);
+        actor->SetUserMatrix(hand.matrix);
+        actor->SetVisibility(0);
+        renderer_->AddActor(actor);
+      }
+      hand.head->GetProperty()->SetSpecular(0.6);
+      hand.head->GetProperty()->SetSpecularPower(40);
+      hand.shaft->GetProperty()->SetColor(0.62, 0.66, 0.72);
+      hand.shaft->GetProperty()->SetSpecular(0.5);
     }
-    burr_->GetProperty()->SetColor(0.75, 0.72, 0.62);
-    burr_->GetProperty()->SetSpecular(0.6);
-    burr_->GetProperty()->SetSpecularPower(40);
-    shaft_->GetProperty()->SetColor(0.62, 0.66, 0.72);
-    shaft_->GetProperty()->SetSpecular(0.5);
     set_tool(tool_);
   }
 
@@ -278,7 +282,7 @@ class RehearsalWindow {
 
   [[nodiscard]] FreeWays free_ways(Rehearsal& rehearsal, bool whole_tool) const {
     const auto drill = static_cast<std::size_t>(tool_);
-    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_burr(drill, whole_tool);
+    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_instrument(drill, whole_tool);
     std::optional<FreeWays> ways;
     rehearsal.look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin)); });
     return *std::move(ways);
@@ -304,7 +308,7 @@ class RehearsalWindow {
     turn_handle(rehearsal, seconds);
     goal_.axis = to_floats(axis_);
     goal_.tool = static_cast<std::uint8_t>(tool_);
-    goal_.drill_on = drill_latched_ || drill_held_ ? 1 : 0;
+    goal_.pedal = drill_latched_ || drill_held_ ? 255 : 0;
     mouse->set_goal(goal_);
   }
 
@@ -351,7 +355,7 @@ class RehearsalWindow {
       goal_.position_mm = end.at_mm;
       axis_ = end.axis;
       goal_.axis = to_floats(axis_);
-      goal_.drill_on = 0;
+      goal_.pedal = 0;
       device.lead(way);
     };
     const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
@@ -410,9 +414,22 @@ class RehearsalWindow {
       return;
     }
     tool_ = tool;
-    const Burr& burr = burr_library()[static_cast<std::size_t>(tool)];
-    burr_mapper_->SetInputData(round_cone_surface(burr.head()));
-    shaft_mapper_->SetInputData(round_cone_surface(burr.shaft()));
+    draw_instrument(drawn_[0], tool);
+  }
+
+  // What a hand is drawn as.
+  struct DrawnHand {
+    vtkNew<vtkActor> head, shaft;
+    vtkNew<vtkPolyDataMapper> head_mapper, shaft_mapper;
+    vtkNew<vtkMatrix4x4> matrix;
+    int tool = -1;
+  };
+  static void draw_instrument(DrawnHand& hand, int tool) {
+    if (hand.tool == tool) return;
+    hand.tool = tool;
+    const Instrument& held = instrument_of(static_cast<std::uint8_t>(tool));
+    hand.head_mapper->SetInputData(round_cone_surface(held.head));
+    hand.shaft_mapper->SetInputData(round_cone_surface(held.shaft));
   }
 
   // World point under a window position at the depth of `reference` along the view.
@@ -476,7 +493,13 @@ class RehearsalWindow {
     });
     world_view_->highlight(tools_->piece());
     const TickRecord tick = now.latest();
-    place_tool(tick);
+    place_tool(drawn_[0], tick);
+    for (std::size_t hand = 1; hand < now.hands(); ++hand) {
+      const TickRecord other = now.latest(hand);
+      if (other.tick == 0) continue;
+      draw_instrument(drawn_[hand], other.device.tool);
+      place_tool(drawn_[hand], other);
+    }
     tools_->show(tick);
     wash(now, tick);
     note_camera(now);
@@ -546,36 +569,40 @@ class RehearsalWindow {
     if ((go_on || anew) && attempt(anew, false)) say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
   }
 
-  // The second hand: a sucker (V) and water (I) at the burr.
+  // The second hand, where no device moves it: a sucker (V) or water (I) beside the burr, else out of the way.
   void wash(Rehearsal& rehearsal, const TickRecord& tick) {
-    constexpr double kNozzleMm = 4, kMm3PerS = 60, kSprayMm = 8, kSharePerS = 3;
-    const Vec3 at = from_floats(tick.device.position_mm);
-    const auto say_once = [&](bool wanted, bool& on, const SceneAction& with, const SceneAction& without) {
-      if (wanted || on) rehearsal.act(wanted ? with : without);
-      on = wanted;
-    };
-    say_once(keyboard_.held(Command::suck), sucking_, SceneAction::suction(at, kNozzleMm, kMm3PerS),
-             SceneAction::suction(at, kNozzleMm, 0));
-    say_once(keyboard_.held(Command::wash), washing_, SceneAction::irrigate(at, kSprayMm, kSharePerS),
-             SceneAction::irrigate(at, kSprayMm, 0));
+    auto* const hand = rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;
+    if (hand == nullptr) return;
+    static const auto sucker = static_cast<std::uint8_t>(instrument_index("sucker 10 Fr"));
+    static const auto water = static_cast<std::uint8_t>(instrument_index("irrigator 2 mm"));
+    const bool suck = sucking_ = keyboard_.held(Command::suck), wash = washing_ = keyboard_.held(Command::wash);
+    const ViewAxes view = view_axes();
+    HandGoal goal;
+    goal.tool = wash && !suck ? water : sucker;
+    goal.pedal = suck || wash ? 255 : 0;
+    goal.axis = to_floats(normalized(view.right - view.forward));
+    const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
+    goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + view.right * gap;
+    if (!suck && !wash) goal.position_mm += view.right * 30 - view.forward * 40;
+    hand->set_goal(goal);
   }
-  void place_tool(const TickRecord& tick) {
+  void place_tool(DrawnHand& hand, const TickRecord& tick) {
     const Vec3 axis = normalized(from_floats(tick.device.axis));
     const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
     const Vec3 columns[3] = {u, v, axis};
     for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) tool_matrix_->SetElement(r, c, columns[c][static_cast<std::size_t>(r)]);
+      for (int r = 0; r < 3; ++r) hand.matrix->SetElement(r, c, columns[c][static_cast<std::size_t>(r)]);
     }
     for (int r = 0; r < 3; ++r) {
       // At the bone's surface, not in it, however far the hand has sunk in.
       const auto a = static_cast<std::size_t>(r);
-      tool_matrix_->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
+      hand.matrix->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
     }
-    tool_matrix_->Modified();
-    const bool on = tick.device.drill_on != 0, shown = (tick.flags & kPlateInHand) == 0;
-    burr_->SetVisibility(shown ? 1 : 0);
-    shaft_->SetVisibility(shown ? 1 : 0);
-    burr_->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
+    hand.matrix->Modified();
+    const bool on = tick.device.pedal != 0, shown = (tick.flags & kPlateInHand) == 0;
+    hand.head->SetVisibility(shown ? 1 : 0);
+    hand.shaft->SetVisibility(shown ? 1 : 0);
+    hand.head->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
   }
 
   void mouse_and_keys(Rehearsal& rehearsal) {
@@ -871,9 +898,7 @@ class RehearsalWindow {
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
-  vtkNew<vtkPolyDataMapper> burr_mapper_, shaft_mapper_;
-  vtkNew<vtkActor> burr_, shaft_;
-  vtkNew<vtkMatrix4x4> tool_matrix_;
+  std::array<DrawnHand, kMostHands> drawn_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;

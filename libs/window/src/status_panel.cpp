@@ -41,8 +41,10 @@ void draw_status(const Rehearsal& rehearsal, const TickRecord& tick) {
       }
     }
   }
-  const Burr& burr = burr_library()[std::min<std::size_t>(tick.device.tool, burr_library().size() - 1)];
-  if (const std::string small = too_small_for_voxels(burr, rehearsal.finest_voxel_mm()); !small.empty()) {
+  const Instrument& held = instrument_of(tick.device.tool);
+  const Burr* const burr = held.as_burr();
+  if (const std::string small = burr != nullptr ? too_small_for_voxels(*burr, rehearsal.finest_voxel_mm()) : std::string();
+      !small.empty()) {
     ImGui::PushStyleColor(ImGuiCol_Text, kAmber);
     ImGui::TextWrapped("%s", small.c_str());
     ImGui::PopStyleColor();

@@ -41,7 +41,7 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"tick", s.tick.tick},
                                  {"at_mm", list(from_floats(s.tick.device.position_mm))},
                                  {"axis", list(from_floats(s.tick.device.axis))},
-                                 {"drill_on", s.tick.device.drill_on != 0},
+                                 {"drill_on", s.tick.device.pedal != 0},
                                  {"force_n", length(force)},
                                  {"removed_mm3", s.removed_mm3},
                                  {"bodies", s.bodies},

@@ -24,7 +24,7 @@ DeviceSample at(double x, double y, double z, int tool = 3) {
   DeviceSample s;
   s.position_mm = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
   s.axis = {0.6F, 0, 0.8F};
-  s.drill_on = 1;
+  s.pedal = 255;
   s.tool = static_cast<std::uint8_t>(tool);
   return s;
 }
@@ -98,7 +98,7 @@ TEST(RoundCone, DistanceIsThatOfTheHullOfItsBalls) {
 TEST(BurrSurface, SamplesLieOnItEvenly) {
   for (const BurrShape shape : {BurrShape::ball, BurrShape::cylinder, BurrShape::taper}) {
     const Burr& burr = burr_library()[static_cast<std::size_t>(burr_index(BurrKind::cutting, 4, shape))];
-    const auto s = sample_burr_surface(burr, 2000);
+    const auto s = sample_head_surface(burr.head(), burr.falloff_mm3_per_s_per_n_per_rad / burr.rate_mm3_per_s_per_n, 2000);
     Vec3 sum{};
     for (std::size_t i = 0; i < s.offset_mm.size(); ++i) {
       const auto& o = s.offset_mm[i];
@@ -304,7 +304,7 @@ TEST(Contact, ProxyDoesNotPassAThinShell) {
     const auto model = model_of(ContactMethod::proxy, 0.5);
     for (double z = 4; z > -6; z -= 0.05) {
       auto pose = at(0.2, 0.1, sign * z);
-      pose.drill_on = 0;
+      pose.pedal = 0;
       const auto r = model->contact(plate, pose);
       const double shown = z + sign * r.shown_offset_mm.z;
       EXPECT_GT(shown, 2.2) << z;
@@ -322,7 +322,7 @@ TEST(Contact, ProxySticksAndSlips) {
   params.static_friction = 0.3;
   const auto model = model_of(ContactMethod::proxy, 0.5, params);
   auto pose = at(0, 0, 3);
-  pose.drill_on = 0;
+  pose.pedal = 0;
   static_cast<void>(model->contact(bone, pose));
   for (int i = 0; i <= 100; ++i) {
     pose.position_mm = {0, 0, static_cast<float>(3 - 2 * i / 100.0)};  // 1 mm deep
@@ -468,7 +468,7 @@ Layers fed(bool hard, double h, double hz, double mm_s = 1) {
     const double deep = mm_s * t / hz;  // of the burr's lowest point
     auto pose = at(0, 0, 2 - deep);
     pose.axis = {1, 0, 0};
-    pose.drill_on = 1;
+    pose.pedal = 255;
     const double n = static_cast<double>(renderer.step(pose).record.normal_force_n);
     // The head all in the one or the other; walls beside it alike.
     if (deep > 4 && deep < 4.9) {
@@ -514,7 +514,7 @@ TEST(Hardness, RemovalIsTheSameForAnyVoxelAndTick) {
       HandGoal goal;
       goal.position_mm = {4 * std::sin(6 * s), 4 * std::cos(6 * s), 0.4 - 1.0 * s};
       goal.axis = {0.6F, 0, 0.8F};
-      goal.drill_on = 1;
+      goal.pedal = 255;
       goal.tool = 3;
       const auto record = renderer.step(hand.step(goal, 1 / hz, force)).record;
       force = from_floats(record.force_n);
@@ -562,7 +562,7 @@ TEST(LiveSurface, FollowsTheDrillToTheBit) {
   HapticRenderer renderer({}, bone, {}, 1e-3);
   Stream stream;
   StreamReader& reader = stream.add_reader();
-  Script script;
+  Strokes script;
   script.axis = {0.6, 0, 0.8};
   script.waypoints = {{0, {-5, 0, 4}, true}, {0.3, {-5, 0, 0}, true}, {1.0, {5, 3, -2}, true}};
   ScriptedDevice device(script, 1000);

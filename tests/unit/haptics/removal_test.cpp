@@ -258,8 +258,7 @@ TEST(Removal, APieceThatWasMovedLosesWhatWasSweptInIt) {
   const Vec3 n = normalized({0.3, -0.5, 0.4});
   const RigidTransform pose{frame_of_axis(n), {30, -12, 7}};
   HapticScene scene;
-  scene.items.push_back({std::make_shared<TouchedBone>(renderer.setup(), bone, nullptr), pose, pose.inverse()});
-  scene.make_room();
+  scene.add(std::make_shared<TouchedBone>(bone, nullptr), pose, renderer.setup());
   renderer.show(&scene);
   const Path path = dwell(3, 0.46, 2);
   const double before = bone.sum();

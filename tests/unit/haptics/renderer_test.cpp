@@ -16,7 +16,7 @@ DeviceSample at(Vec3 x, Vec3 axis, bool drill, int tool = 3) {
   DeviceSample s;
   s.position_mm = {static_cast<float>(x.x), static_cast<float>(x.y), static_cast<float>(x.z)};
   s.axis = {static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z)};
-  s.drill_on = drill ? 1 : 0;
+  s.pedal = drill ? 255 : 0;
   s.tool = static_cast<std::uint8_t>(tool);
   return s;
 }
@@ -25,6 +25,7 @@ HapticSetup quiet() {
   HapticSetup s;
   s.device = SpringHand::traits();
   s.params.effects.vibration = false;
+  s.params.effects.spin_up_s = s.params.effects.spin_down_s = 0;
   return s;
 }
 
@@ -294,7 +295,7 @@ TEST(Structures, OnlyATurningBurrInjures) {
     return f & kStructureInjured;
   };
   EXPECT_NE(flags([](HapticRenderer&, DeviceSample&) {}), 0u);
-  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.drill_on = 0; }), 0u);
+  EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.pedal = 0; }), 0u);
   EXPECT_EQ(flags([](HapticRenderer& r, DeviceSample&) { r.hold(true); }), 0u);
   EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.age_ms = 60; }), 0u);
   EXPECT_EQ(flags([](HapticRenderer&, DeviceSample& s) { s.position_mm[0] = NAN; }), 0u);
@@ -334,9 +335,8 @@ TEST(Removal, BodiesShareTheForce) {
     }
     HapticRenderer r(setup, Anatomy{}, 1e-3);
     HapticScene scene;
-    scene.items.push_back({std::make_shared<TouchedBone>(r.setup(), left, nullptr), {}, {}});
-    if (two) scene.items.push_back({std::make_shared<TouchedBone>(r.setup(), right, nullptr), {}, {}});
-    scene.make_room();
+    scene.add(std::make_shared<TouchedBone>(left, nullptr), {}, r.setup());
+    if (two) scene.add(std::make_shared<TouchedBone>(right, nullptr), {}, r.setup());
     r.show(&scene);
     double removed = 0;
     *force_n = 0;

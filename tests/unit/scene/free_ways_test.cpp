@@ -88,7 +88,7 @@ class Hand {
     if (length(force_n_) < 0.5 || ++pressed_ > 100) pressed_ = 1000;
     if (pressed_ >= 1000) most_n_ = std::max(most_n_, length(force_n_));
     removed_mm3_ += static_cast<double>(last_.removed_mm3);
-    drilled_ = drilled_ || last_.device.drill_on != 0;
+    drilled_ = drilled_ || last_.device.pedal != 0;
   }
   Led walk(const HandWay& way) {
     device_.lead(way);
@@ -128,7 +128,7 @@ class Hand {
 
 // From each view to what one sees there, beginning where the view before ended.
 void from_six_views(const char* name, const World& world) {
-  const FreeWays ways(world, skin_of_burr(kTool));
+  const FreeWays ways(world, skin_of_instrument(kTool));
   const HandPose start = ways.waiting(normalized(kViews[0].eye), kViews[0].axis());
   Hand hand(world, start);
   hand.tick();
@@ -210,7 +210,7 @@ TEST(FreeWays, BackThroughATunnel) {
     return !(slot || tunnel || hole);
   };
   const World world = carved({24, 12, 12}, bone);
-  const FreeWays ways(world, skin_of_burr(kTool));
+  const FreeWays ways(world, skin_of_instrument(kTool));
   const HandPose inside{{8, 0, -4}, {0, 0, 1}};
   ASSERT_TRUE(ways.free(inside, 0.4));
   Hand hand(world, inside);
@@ -229,7 +229,7 @@ TEST(FreeWays, BackThroughATunnel) {
 // No way leads out of a closed shell: the tool is taken away and put where it was wanted.
 TEST(FreeWays, OutOfAClosedShellItIsPut) {
   const World world = carved({24, 24, 24}, [](Vec3 p) { return length(p) > 12 && length(p) < 20; });
-  const FreeWays ways(world, skin_of_burr(kTool));
+  const FreeWays ways(world, skin_of_instrument(kTool));
   // The shaft sticks in the shell: jammed, as the drill was that began at the origin.
   Hand hand(world, {{0, 0, 0}, normalized({0.6, 0.4, 0.6})});
   for (int t = 0; t < 1000; ++t) hand.tick();
@@ -244,7 +244,7 @@ TEST(FreeWays, OutOfAClosedShellItIsPut) {
 // Pressed hard, drill on: the way begins by letting go.
 TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
   const World world = carved({20, 20, 12}, [](Vec3 p) { return p.z < 4; });
-  const FreeWays ways(world, skin_of_burr(kTool));
+  const FreeWays ways(world, skin_of_instrument(kTool));
   const Vec3 axis = normalized({0.3, 0.2, 0.9});
   Hand hand(world, {{0, 0, 8}, axis});
   hand.push({0, 0, -1}, true, 6000);
@@ -259,7 +259,7 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
     hand.tick();
     EXPECT_LT(hand.force_n(), std::max(last, 0.7) + 0.3) << "tick " << t;
     last = hand.force_n();
-    EXPECT_EQ(hand.last().device.drill_on, 0);
+    EXPECT_EQ(hand.last().device.pedal, 0);
   }
   EXPECT_EQ(hand.removed_mm3(), removed);
   EXPECT_EQ(hand.device().led(), Led::arrived);
@@ -269,7 +269,7 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
 // What came into the way after it was found: the hand gives up where it is, and does not press.
 TEST(FreeWays, GivesUpWhereSomethingIsInTheWay) {
   const World empty = carved({20, 20, 20}, [](Vec3 p) { return length(p - Vec3{-15, 0, 0}) < 3; });
-  const FreeWays ways(empty, skin_of_burr(kTool));
+  const FreeWays ways(empty, skin_of_instrument(kTool));
   const HandPose a = ways.waiting({1, 0, 0}, {1, 0, 0});
   const World wall = carved({20, 20, 20}, [](Vec3 p) { return std::abs(p.x) < 4; });
   Hand hand(wall, a);
@@ -307,7 +307,7 @@ TEST(FreeWays, AfterAWayOnlyANewGoalCounts) {
 // The handle follows the view as far as bone lets its shaft.
 TEST(FreeWays, TurnsOnlyAsFarAsTheShaftIsFree) {
   const World world = carved({20, 20, 20}, [](Vec3 p) { return p.z < 0 && std::hypot(p.x, p.y) > 4; });
-  const FreeWays shaft(world, skin_of_burr(kTool, false));
+  const FreeWays shaft(world, skin_of_instrument(kTool, false));
   HandPose pose{{0, 0, -10}, {0, 0, 1}};
   for (int frame = 0; frame < 200; ++frame) pose.axis = shaft.turned(pose, {1, 0, 0}, 0.1);
   const double tilt = std::atan2(pose.axis.x, pose.axis.z);
@@ -322,7 +322,7 @@ TEST(FreeWays, TurnsOnlyAsFarAsTheShaftIsFree) {
 // A burr that rests on the floor of a hole touches bone already: the shaft may not touch more.
 TEST(FreeWays, ATouchingToolTurnsOnlyAsFarAsItTouchesNoMore) {
   const World world = carved({20, 20, 20}, [](Vec3 p) { return p.z < 0 && (std::hypot(p.x, p.y) > 4 || p.z < -12); });
-  const FreeWays whole(world, skin_of_burr(kTool));
+  const FreeWays whole(world, skin_of_instrument(kTool));
   const HandPose pose{{0, 0, -10.6}, {0, 0, 1}};
   ASSERT_FALSE(whole.free(pose, 0));
   const Vec3 axis = whole.turned(pose, {1, 0, 0}, 1);
@@ -331,7 +331,7 @@ TEST(FreeWays, ATouchingToolTurnsOnlyAsFarAsItTouchesNoMore) {
 
 TEST(FreeWays, WaitsInFreeAirWhereverOneLooksFrom) {
   const World world = carved({30, 10, 20}, [](Vec3) { return true; });
-  const FreeWays ways(world, skin_of_burr(kTool));
+  const FreeWays ways(world, skin_of_instrument(kTool));
   for (const View& view : kViews) {
     const HandPose pose = ways.waiting(normalized(view.eye), view.axis());
     EXPECT_TRUE(ways.free(pose, 2));

@@ -155,8 +155,7 @@ TEST(Operation, ACutThatNobodyOpenedIsNotFelt) {
       second.first_brick = static_cast<std::uint32_t>(right.brick_count());
       second.bone = std::move(right);
       HapticScene scene = HapticScene::of(world, renderer.setup());
-      scene.items.push_back({std::make_shared<TouchedBone>(renderer.setup(), std::make_shared<Body>(std::move(second))), {}, {}});
-      scene.make_room();
+      scene.add(std::make_shared<TouchedBone>(std::make_shared<Body>(std::move(second))), {}, renderer.setup());
       renderer.show(&scene);
       ScriptedDevice device(strokes(4, 2), 1000);
       Vec3 force{};

@@ -37,7 +37,7 @@ RehearsalSummary run(const Script& script, bool by_the_clock, const std::filesys
   o.follow = {true, true, dust};
   o.haptics.device = SpringHand::traits();
   o.actions = actions_of(script, 1000);
-  Rehearsal r(World(test::bar(0.5, 0)), std::make_unique<ScriptedDevice>(script, 1000), o, {});
+  Rehearsal r(World(test::bar(0.5, 0)), devices_of(script, 1000), o, {});
   if (!by_the_clock) return r.run_to_end({});
   r.start();
   while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -46,9 +46,9 @@ RehearsalSummary run(const Script& script, bool by_the_clock, const std::filesys
 
 TEST(ScriptedScene, ActionsAfterTheLastWaypointAreDoneWithTheDrillAtRest) {
   Script script = press();
-  script.deeds = {{0.3, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
-                  {0.7, SceneAction::split(20)},
-                  {1.0, SceneAction::move(1, {{}, {0, 30, 0}})}};
+  script.actions = {{0.3, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
+                    {0.7, SceneAction::split(20)},
+                    {1.0, SceneAction::move(1, {{}, {0, 30, 0}})}};
   EXPECT_EQ(script.seconds(), 1.0);
   for (const bool by_the_clock : {false, true}) {
     const auto file = fresh("late.oss");
@@ -60,8 +60,9 @@ TEST(ScriptedScene, ActionsAfterTheLastWaypointAreDoneWithTheDrillAtRest) {
     EXPECT_TRUE(session.actions.back().action.is(ActionKind::move));
     double before = 0, after = 0;
     for (const TickRecord& t : session.ticks) {
-      EXPECT_EQ(t.device.drill_on, t.tick < 400 ? 1 : 0) << t.tick;
-      (t.tick < 400 ? before : after) += static_cast<double>(t.removed_mm3);
+      EXPECT_EQ(t.device.pedal, t.tick < 400 ? 255 : 0) << t.tick;
+      // By 0.35 s it has run out.
+      (t.tick < 750 ? before : after) += static_cast<double>(t.removed_mm3);
     }
     EXPECT_GT(before, 0.01);
     EXPECT_EQ(after, 0) << "it drilled on while it waited";
@@ -72,11 +73,11 @@ TEST(ScriptedScene, ActionsAfterTheLastWaypointAreDoneWithTheDrillAtRest) {
 TEST(ScriptedScene, EveryRefusalIsInTheSummaryWithItsTime) {
   Script script = press();
   const auto mini = static_cast<std::uint32_t>(plate_index("miniplate-4"));
-  script.deeds = {{0.05, SceneAction::saw({{500, 0, 0}, {1, 0, 0}})},
-                  {0.1, SceneAction::attach(mini, {{}, {900, 0, 4}}, 0)},
-                  {0.15, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
-                  {0.2, SceneAction::detach(7)}};
-  for (int n = 0; n < 5; ++n) script.deeds.push_back({0.25 + 0.01 * n, SceneAction::move(9, {})});
+  script.actions = {{0.05, SceneAction::saw({{500, 0, 0}, {1, 0, 0}})},
+                    {0.1, SceneAction::attach(mini, {{}, {900, 0, 4}}, 0)},
+                    {0.15, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
+                    {0.2, SceneAction::detach(7)}};
+  for (int n = 0; n < 5; ++n) script.actions.push_back({0.25 + 0.01 * n, SceneAction::move(9, {})});
   for (const bool by_the_clock : {false, true}) {
     RehearsalSummary s = run(script, by_the_clock);
     ASSERT_EQ(s.notes.size(), 4u);
@@ -105,10 +106,10 @@ TEST(ScriptedScene, EveryRefusalIsInTheSummaryWithItsTime) {
 TEST(ScriptedScene, WhatIsDoneOtherwiseThanAskedIsNoRefusalButTold) {
   Script script = press();
   const auto distractor = static_cast<std::uint32_t>(plate_index("distractor"));
-  script.deeds = {{0.1, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
-                  {0.15, SceneAction::split(20)},
-                  {0.2, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
-                  {0.3, SceneAction::open(1, 99)}};
+  script.actions = {{0.1, SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})},
+                    {0.15, SceneAction::split(20)},
+                    {0.2, SceneAction::attach(distractor, {{}, {-4, 0, 4}}, 0, 1)},
+                    {0.3, SceneAction::open(1, 99)}};
   const RehearsalSummary s = run(script, false);
   ASSERT_EQ(s.notes.size(), 1u);
   EXPECT_TRUE(s.notes[0].done);
@@ -159,7 +160,7 @@ TEST(ScriptedScene, DoubtsAboutAScript) {
   s.waypoints = {{0, {-5000, 0, 0}, true}, {1, {5000, 0, 0}, true}};
   EXPECT_EQ(doubts(s), "");
   s = press();
-  s.deeds = {{0.1, SceneAction::irrigate({0, 0, 5}, 5, 1)}};
+  s.actions = {{0.1, SceneAction::irrigate({0, 0, 5}, 5, 1)}};
   EXPECT_NE(doubts(s).find("--dust"), std::string::npos);
   EXPECT_EQ(doubts(s, true), "");
 }

@@ -62,7 +62,7 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
   const auto ticks = some_ticks(0, 50);
   {
     test::OtherWriter w(path, header("later"), test::with_pulse(), [](ordered_json& j) {
-      j["burrs"].push_back({{"name", "laser 1 mm"}, {"kind", "laser"}, {"diameter_mm", 1}});
+      j["instruments"].push_back({{"name", "laser 1 mm"}, {"kind", "laser"}});
       j["actions"]["99"] = "glue";
       j["records"]["nerve"] = {{"part", 9}, {"fields", {{{"name", "v_mv"}, {"type", "f64"}, {"unit", "mV"}, {"role", "result"}}}}};
       j["what comes next"] = {1, 2, 3};

@@ -44,32 +44,29 @@ struct Burr {
   [[nodiscard]] RoundCone shaft() const;
 };
 
-/// The library: cutting and diamond, balls, cylinders and tapers, 1 to 7 mm. A tool is named by its index here, also in
-/// session files; the balls come first.
+/// The library: cutting and diamond, balls, cylinders and tapers, 1 to 7 mm; the balls come first.
 [[nodiscard]] const std::vector<Burr>& burr_library();
-/// Depths of flat cuts of each burr of the library, and of its shaft; made once, at the first call.
-[[nodiscard]] const CutDepth& head_cut_depth(std::size_t tool);
-[[nodiscard]] const CutDepth& shaft_cut_depth(std::size_t tool);
 /// Error(usage) when there is none.
 [[nodiscard]] int burr_index(BurrKind kind, double diameter_mm, BurrShape shape = BurrShape::ball);
 /// Changes whenever the library does, or what its burrs remove: stored in session files, since the same poses would come out differently.
 inline constexpr int kBurrLibraryVersion = 3;
 
-/// About 3000 points of a cubic lattice inside the head, each standing for an equal share of its volume.
+/// About 3000 points of a cubic lattice inside a head, each standing for an equal share of its volume.
 struct BurrSamples {
   std::vector<std::array<float, 3>> offset_mm;  ///< from the tip's centre, handle along +z
   std::vector<std::array<float, 3>> inward;     ///< unit, to the nearest point of the axis
   std::vector<float> efficiency;                ///< 0 to 1: removal rate at this latitude over the rate at the equator
   double sample_volume_mm3 = 0;
 };
-[[nodiscard]] BurrSamples sample_burr(const Burr& burr);
+/// `falloff_per_rad`: share of the efficiency lost for each radian of latitude.
+[[nodiscard]] BurrSamples sample_head(const RoundCone& head, double falloff_per_rad);
 
-/// Points spread evenly over the surface of the head, a spiral of equal areas.
+/// Points spread evenly over the surface of a head, a spiral of equal areas.
 struct BurrSurface {
   std::vector<std::array<float, 3>> offset_mm, inward;
   std::vector<float> efficiency, reach_mm;  ///< reach: to the axis along `inward`
   double sample_area_mm2 = 0;
 };
-[[nodiscard]] BurrSurface sample_burr_surface(const Burr& burr, int samples);
+[[nodiscard]] BurrSurface sample_head_surface(const RoundCone& head, double falloff_per_rad, int samples);
 
 }  // namespace osteo

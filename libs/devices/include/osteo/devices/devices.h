@@ -77,12 +77,17 @@ class FootPedal final : HidHandler {
   return text.empty() && pedal != nullptr ? pedal->trouble() : text;
 }
 
-/// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 drills; with a pedal, that does (bit 0; bit 1
-/// changes nothing here).
+/// Which of a pedal's switches press a device's own: the left one hand 0, the right one hand 1.
+[[nodiscard]] constexpr std::uint32_t pedal_bit(std::size_t hand) {
+  return hand == 0 ? 1U : 4U;
+}
+
+/// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 presses the pedal; so does a real one, by its
+/// switch pedal_bit().
 class SpaceMouseDevice final : public Device, HidHandler {
  public:
   /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
-  SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal);
+  SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal, std::size_t hand = 0);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   bool lead(const HandWay& way) noexcept override {
@@ -108,15 +113,17 @@ class SpaceMouseDevice final : public Device, HidHandler {
   GuidedHand hand_;
   Mat3 rotation_;
   const FootPedal* pedal_;
+  std::uint32_t pedal_bit_;
   HidLink link_;
 };
 
 /// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the latest force, bridged by
 /// its plane of contact when the servo is late; the servo reads the latest pose. Motors rest until the servo speaks, and when it falls
-/// silent.
+/// silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the clutch of every arm.
 class WoodenHapticsDevice final : public Device, HidHandler {
  public:
-  WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal);
+  WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal,
+                      std::size_t hand = 0);
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
@@ -144,6 +151,7 @@ class WoodenHapticsDevice final : public Device, HidHandler {
   WorkspaceMap map_;
   std::atomic<std::uint8_t> tool_;
   const FootPedal* pedal_;
+  std::uint32_t pedal_bit_;
   Seqlock<Pose> pose_;
   Seqlock<ForcePlane> force_;
   Pose last_pose_;      // of the servo

@@ -52,7 +52,8 @@ class HidLink {
   std::thread thread_;
 };
 
-/// Opens the first device of the kernel for which `wanted` holds.
-[[nodiscard]] HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted);
+/// Opens the first device of the kernel for which `wanted` holds, or with `before` the first behind as many of those: two alike are told
+/// apart by the order of their paths.
+[[nodiscard]] HidLink::Open open_first(std::function<bool(const HidInfo&)> wanted, int before = 0);
 
 }  // namespace osteo

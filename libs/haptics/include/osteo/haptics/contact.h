@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "osteo/base/param.h"
-#include "osteo/bone/burr.h"
 #include "osteo/bone/hardness.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/haptics/grains.h"
 #include "osteo/haptics/overlap.h"
@@ -69,18 +69,25 @@ struct Cut {
   bool in_turns = false;  ///< only some of the voxels under the burr are listed, others the next time
 };
 
-/// A contact model is one way from pose to force; scenes choose one. Everything is allocated when it is made.
+/// A contact model is one way from pose to force; scenes choose one. It remembers one hand's contact with one bone. Everything is allocated
+/// when it is made.
 class ContactModel {
  public:
+  explicit ContactModel(const ContactParams& params) : params_(params) {}
   virtual ~ContactModel() = default;
+  /// The law of force from the next contact() on; `method` is that of the model, whatever it says here.
+  void set(const ContactParams& params) noexcept { params_ = params; }
   /// Force for this pose. A pose that is not finite gives none. No allocation, no exception.
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
-  /// What the last contact() would cut; empty when the drill was off. Valid until the next contact().
+  /// What the last contact() would cut; empty when the pedal was up. Valid until the next contact().
   [[nodiscard]] virtual Cut cut(const BrickGrid& bone) noexcept = 0;
   /// Another model is in use now: what this one remembers of the hand is out of date.
   virtual void rest() noexcept {}
   /// What the last contact() overlapped, where that is all that matters: of several bones it may be added up. Null: it may not.
   [[nodiscard]] virtual const OverlapResult* overlapped() const noexcept { return nullptr; }
+
+ protected:
+  ContactParams params_;
 };
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers.
@@ -93,18 +100,18 @@ inline constexpr double kLeastRadiusVoxels = 2;
 
 /// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight, but nowhere more than what the burr
 /// has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate depends on neither voxels nor ticks.
-/// Remembers where the burr has been: one for each bone.
+/// Remembers where burrs have been: one for each bone, whichever hand holds them.
 class Removal {
  public:
   explicit Removal(const BrickGrid& bone);
-  /// `hardness` may be null. Returns the changed voxels (valid until the next call) and sets what was removed.
+  /// `hardness` may be null; `hand` below kMostHands. Returns the changed voxels (valid until the next call) and sets what was removed.
   std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
-                                      const Hardness* hardness, double& removed_mm3) noexcept;
+                                      const Hardness* hardness, double& removed_mm3, std::size_t hand = 0) noexcept;
   [[nodiscard]] Grains& grains() { return grains_; }
   [[nodiscard]] const Grains& grains() const { return grains_; }
 
  private:
-  double carry_mm3_ = 0;
+  std::array<double, kMostHands> carry_mm3_{};
   Grains grains_;
   std::vector<float> reached_;  // of each hit, how much density the burr may still take
   std::vector<VoxelChange> changes_;
@@ -112,7 +119,7 @@ class Removal {
 
 /// At most about this many voxels change in a tick: with more under the burr, their rows take turns.
 inline constexpr std::size_t kMostCutPerTick = 1024;
-/// Room for the hits of any burr of the library at this spacing.
+/// Room for the hits of any instrument of the library at this spacing.
 [[nodiscard]] std::size_t most_hits(double spacing_mm);
 
 }  // namespace osteo

@@ -13,7 +13,7 @@
 
 namespace osteo {
 
-/// A way that a hand takes by itself, the drill off: straight from point to point, from wherever it is. FreeWays finds them.
+/// A way that a hand takes by itself, the pedal up: straight from point to point, from wherever it is. FreeWays finds them.
 struct HandWay {
   static constexpr std::size_t kMost = 96;
   struct Point {
@@ -51,11 +51,11 @@ class Device {
   [[nodiscard]] virtual bool active(std::uint64_t) const noexcept { return true; }
 };
 
-/// Where the hand wants the burr to be.
+/// Where the hand wants the tip of its instrument to be.
 struct HandGoal {
   Vec3 position_mm{};
   std::array<float, 3> axis{0, 0, 1};
-  std::uint8_t drill_on = 0;
+  std::uint8_t pedal = 0;  ///< as DeviceSample::pedal
   std::uint8_t tool = 0;
 };
 
@@ -133,52 +133,35 @@ class MouseDevice final : public Device {
   std::uint32_t seen_ = 0;  // the window's
 };
 
-/// Straight moves between points in time.
-struct Script {
+/// What a scripted hand does: straight moves between points in time.
+struct Strokes {
   struct Waypoint {
     double t_s = 0;
     Vec3 at_mm;
     bool drill_on = false;
+    double pedal = 1;  ///< how far down while it is on, 0 to 1
   };
-  int tool = 3;  ///< index in burr_library()
+  int tool = 3;  ///< index in instrument_library()
   Vec3 axis{0, 0, 1};
   std::vector<Waypoint> waypoints;  ///< at least one, times rising
-  struct Deed {
-    double t_s = 0;
-    SceneAction action;
-    [[nodiscard]] std::uint64_t tick(double rate_hz) const {
-      return static_cast<std::uint64_t>(std::llround(std::max(0.0, t_s) * rate_hz));
-    }
-  };
-  struct Camera {
-    Vec3 centre_mm;
-    double radius_mm = 32;
-    Vec3 eye{1, 0, 0};  ///< from the centre towards who looks
-  };
-  std::optional<Camera> camera;  ///< for its pictures; absent: from where the drill comes, around its strokes
-  std::vector<Deed> deeds;       ///< what else is done, times rising
-  /// Until the last waypoint, or the last deed where that is later.
-  [[nodiscard]] double seconds() const {
-    return std::max(waypoints.empty() ? 0 : waypoints.back().t_s, deeds.empty() ? 0 : deeds.back().t_s);
-  }
 };
 
-/// Follows a script by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand rests there, the drill
-/// off, until the tick of the last deed has been.
+/// Follows strokes by tick number, not by the clock: the same ticks on every run. Behind the last waypoint the hand rests there, the pedal
+/// up; it is active until then, and until `end_tick` where that is later.
 class ScriptedDevice final : public Device {
  public:
-  ScriptedDevice(Script script, double rate_hz)
-      : script_(std::move(script)), rate_hz_(rate_hz), deeds_end_(script_.deeds.empty() ? 0 : script_.deeds.back().tick(rate_hz) + 1) {}
+  ScriptedDevice(Strokes strokes, double rate_hz, std::uint64_t end_tick = 0)
+      : strokes_(std::move(strokes)), rate_hz_(rate_hz), end_tick_(end_tick) {}
   DeviceSample read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] bool active(std::uint64_t tick) const noexcept override {
-    return static_cast<double>(tick) / rate_hz_ < script_.waypoints.back().t_s || tick < deeds_end_;
+    return static_cast<double>(tick) / rate_hz_ < strokes_.waypoints.back().t_s || tick < end_tick_;
   }
 
  private:
-  Script script_;
+  Strokes strokes_;
   double rate_hz_;
-  std::uint64_t deeds_end_;
+  std::uint64_t end_tick_;
   std::size_t leg_ = 0;
   SpringHand hand_;
 };

@@ -1,8 +1,10 @@
 // Which part of each voxel the burr has reached.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "osteo/bone/action.h"
 #include "osteo/bone/round_cone.h"
 #include "osteo/grid/brick_grid.h"
 
@@ -24,8 +26,9 @@ class Grains {
   /// Voxels that have more bone than there count as untouched. Not in the servo.
   void inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known);
 
-  /// The burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked at.
-  void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every = false) noexcept;
+  /// A hand's burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked
+  /// at.
+  void place(const BrickGrid& bone, const RoundCone& head, Vec3 start_mm, Vec3 axis, bool every = false, std::size_t hand = 0) noexcept;
   /// Takes what the burr covers of a voxel where it is placed, and tells how much bone is left that it never covered: density cannot fall
   /// below. Unless `every` voxel is looked at, rows of them take turns while the burr moves little. Cost: 5 ns where it covers the voxel
   /// whole, else 0.02 (64 grains) to 0.4 us, twice that for tapers.
@@ -60,12 +63,17 @@ class Grains {
   std::uint32_t parts_ = 1;             // along each edge of a voxel; 64 grains, a word, in each
   std::size_t words_ = 1, used_ = 0;
   bool overflowed_ = false;
-  // The burr in voxels, as the kernel has it; its axis starts at start_.
+  // The burr in voxels, as the kernel has it; its axis starts at its hand's start.
   struct Head {
     float axis[3] = {}, length = 0, start_radius = 0, slope = 0, slope_run = 0;
     bool ball = true;
   } head_;
-  Vec3 start_, axis_;
+  struct Place {
+    Vec3 start, axis;
+    std::uint32_t turn = 0;
+  };
+  std::array<Place, kMostHands> places_;  // of each hand's burr when it was last placed
+  Vec3 start_;                            // of the one placed now
   std::uint32_t turns_ = 1, turn_ = 0;
 };
 

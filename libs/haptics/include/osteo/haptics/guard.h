@@ -70,6 +70,8 @@ class Guard {
  public:
   /// A limit that is negative or not a number counts as 0: no force, or none that changes.
   Guard(const GuardParams& params, const DeviceTraits& device);
+  /// Other limits from now on; what it remembers of hand and energy stays.
+  void set(const GuardParams& params) noexcept;
 
   struct Input {
     Vec3 position_mm;
@@ -92,7 +94,7 @@ class Guard {
  private:
   GuardParams params_;
   DeviceTraits device_;
-  double most_n_;
+  double most_n_ = 0;
   PassivityControl passivity_;
   Vec3 velocity_, last_x_mm_, last_force_n_;
   bool moving_ = false;  // last_x_mm_ is of the tick before

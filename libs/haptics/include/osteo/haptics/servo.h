@@ -1,8 +1,11 @@
-// The servo: the only writer of the live bone. One step a tick, the same for a device, a script and a replay.
+// The servo: the only writer of the live bone. One step a tick, the same for devices, scripts and replays.
 #pragma once
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "osteo/haptics/device.h"
 #include "osteo/haptics/renderer.h"
@@ -12,29 +15,30 @@ namespace osteo {
 
 /// Something done to the scene, and the scene that follows from it.
 struct Handover {
-  SceneAction action;            ///< its tick is filled in when it happens
-  HapticScene* scene = nullptr;  ///< null: as before. Belongs to whoever posts; lives until another was taken.
-  bool held = false;             ///< from now on nothing is removed
+  SceneAction action;                       ///< its tick is filled in when it happens
+  HapticScene* scene = nullptr;             ///< null: as before. Belongs to whoever posts; lives until another was taken.
+  bool held = false;                        ///< from now on nothing is removed
+  const HapticsParams* settings = nullptr;  ///< null: as before. Belongs to whoever posts, read while it is taken up
 };
 
 class Servo {
  public:
-  /// All must outlive the servo. `rate_hz` fixes the time step, whatever the clock does.
-  Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz)
-      : renderer_(renderer),
-        device_(device),
-        stream_(stream),
-        dt_s_(1 / rate_hz),
-        pause_ticks_(static_cast<std::uint64_t>(std::max(1.0, std::round(kStrokePauseS * rate_hz)))) {}
+  /// All must outlive the servo. As many devices as the renderer has hands, in their order. `rate_hz` fixes the time step, whatever the
+  /// clock does. Error(usage) when devices and hands are not as many.
+  Servo(HapticRenderer& renderer, std::span<Device* const> devices, Stream& stream, double rate_hz);
+  /// Of one hand.
+  Servo(HapticRenderer& renderer, Device& device, Stream& stream, double rate_hz);
 
-  /// A stroke of the burr ends when it has taken no bone for so long: the drill is off, or away from bone. ActionKind::stroke tells of it.
+  /// A stroke of the burr ends when no hand has taken bone for so long: the drill is off, or away from bone. ActionKind::stroke tells of it.
   static constexpr double kStrokePauseS = 0.3;
 
-  /// Take up what was posted, read the device, compute the force, remove bone, tell the readers. False when the device has ended.
+  /// Take up what was posted, read the devices, compute the forces, remove bone, tell the readers. False when all devices have ended.
   bool step(std::int64_t lateness_ns) noexcept;
   [[nodiscard]] std::uint64_t ticks() const { return ticks_.load(std::memory_order_relaxed); }
-  /// By the burr, in all ticks; whoever reads the stream may have lost some.
+  /// By burrs, in all ticks; whoever reads the stream may have lost some.
   [[nodiscard]] double removed_mm3() const { return removed_mm3_.load(std::memory_order_relaxed); }
+  /// A tick is still to come: some device has more to say.
+  [[nodiscard]] bool active() const noexcept;
 
   /// From one other thread: happens at the beginning of the next tick. False while one posted before waits still.
   bool post(const Handover* handover) noexcept;
@@ -44,16 +48,17 @@ class Servo {
   [[nodiscard]] bool taken() const noexcept { return inbox_.load(std::memory_order_acquire) == nullptr; }
 
  private:
+  void take_up(std::uint64_t tick) noexcept;
+
   HapticRenderer& renderer_;
-  Device& device_;
+  std::vector<Device*> devices_;
   Stream& stream_;
   double dt_s_;
   std::atomic<std::uint64_t> ticks_{0};
   std::atomic<double> removed_mm3_{0};
   std::atomic<const Handover*> inbox_{nullptr};
-  void take_up(std::uint64_t tick) noexcept;
   void tell_stroke(std::uint64_t tick, bool removes) noexcept;
-  Vec3 force_n_;
+  std::array<Vec3, kMostHands> force_n_;
   std::uint64_t pause_ticks_, last_removal_ = 0;
   bool in_stroke_ = false;
 };

@@ -32,7 +32,7 @@ class SimulatedDevice final : public Device {
   }
   void set_axis(Vec3 axis) { axis_ = to_floats(axis); }
   void set_drill(bool on, int tool) {
-    drill_ = on;
+    pedal_ = on ? 255 : 0;
     tool_ = static_cast<std::uint8_t>(tool);
   }
 
@@ -51,7 +51,7 @@ class SimulatedDevice final : public Device {
   Vec3 x_mm_, v_mm_s_, push_n_, place_mm_;
   double spring_ = 0, work_mj_ = 0;
   std::array<float, 3> axis_{0, 0, 1};
-  bool drill_ = false;
+  std::uint8_t pedal_ = 0;
   std::uint8_t tool_ = 3;
   static constexpr int kLongestDelay = 128;   // ticks
   std::array<Vec3, kLongestDelay> forces_{};  // a ring, for the delay

@@ -14,14 +14,14 @@
 
 namespace osteo {
 
-/// What a device reports in a tick. Everything that happens follows from the sequence of these.
+/// What a device reports in a tick. Everything that happens follows from the sequences of these, one for each hand.
 struct DeviceSample {
-  std::array<float, 3> position_mm{};  ///< centre of the burr's tip, LPS
-  std::array<float, 3> axis{0, 0, 1};  ///< unit, from burr to handle
-  std::uint8_t drill_on = 0;
-  std::uint8_t tool = 0;     ///< index in burr_library()
-  std::uint8_t age_ms = 0;   ///< since the device last reported; 255: longer, or unplugged
-  std::uint8_t buttons = 0;  ///< of the device, beyond the drill's
+  std::array<float, 3> position_mm{};  ///< centre of the instrument's tip, LPS
+  std::array<float, 3> axis{0, 0, 1};  ///< unit, from tip to handle
+  std::uint8_t pedal = 0;              ///< 0: up, 255: down as far as it goes, which a mere button is at once
+  std::uint8_t tool = 0;               ///< index in instrument_library()
+  std::uint8_t age_ms = 0;             ///< since the device last reported; 255: longer, or unplugged
+  std::uint8_t buttons = 0;            ///< of the device, beyond the pedal's
 };
 static_assert(sizeof(DeviceSample) == 28);
 
@@ -39,12 +39,13 @@ enum TickFlag : std::uint32_t {
   kStructureTouched = 512,   ///< the burr reaches a structure at risk
   kStructureInjured = 1024,  ///< and it turns: it may cut in this tick
   kHeld = 2048,              ///< nothing was removed, since the scene is being changed
-  kPlateInHand = 4096,       ///< the hand holds a plate, not the drill
+  kPlateInHand = 4096,       ///< the hand holds a plate, not its instrument
   kSoftContact = 8192,       ///< soft tissue pushes the tool
   kNoRoom = 16384,           ///< bone that the burr covers in part was left: too many voxels are (Grains::room)
 };
 
-/// One tick, as it is written to session files (little endian).
+/// One tick of one hand, as it is written to session files (little endian). With several hands each tick has one of these for each, in
+/// their order.
 struct TickRecord {
   std::uint64_t tick = 0;
   DeviceSample device;
@@ -61,13 +62,15 @@ struct TickRecord {
   float thickness_mm = 0;       ///< of the bone that the burr presses on, along the push; 0 without contact, at most 10
   float clearance_mm = 0;       ///< to the nearest structure at risk; negative inside; 0 where the scene has none
   std::uint32_t structure = 0;  ///< which that is: its value in the label map; 0: none within reach of the burr's surface
+  std::uint32_t hand = 0;       ///< whose: from 0
+  float speed_rpm = 0;          ///< of the burr, which follows the pedal with its own inertia; 0 of other instruments
   // Below: how the machine did. Not part of what replay must repeat.
   float work_us = 0;
   float lateness_us = 0;
 };
-static_assert(sizeof(TickRecord) == 120);
+static_assert(sizeof(TickRecord) == 128);
 
-/// One reader's end of the stream. A tick record follows the actions and the changes of its tick.
+/// One reader's end of the stream. A tick's records follow its actions and changes.
 struct StreamReader {
   StreamReader(std::size_t tick_capacity, std::size_t change_capacity) : ticks(tick_capacity), changes(change_capacity) {}
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
@@ -77,7 +80,7 @@ struct StreamReader {
   /// The first tick it is told of, with the actions at its beginning or not; kNone until then. What comes before it was never meant for
   /// this reader: it is not lost.
   std::atomic<std::uint64_t> first_tick{kNone};
-  /// Lost because the reader was too slow: ticks with their changes, and actions.
+  /// Lost because the reader was too slow: ticks (all hands of them) with their changes, and actions.
   std::atomic<std::uint64_t> dropped{0}, actions_dropped{0};
 };
 
@@ -103,17 +106,20 @@ class Stream {
       if (!r.actions.push(action)) r.actions_dropped.fetch_add(1, std::memory_order_relaxed);
     });
   }
-  void publish(const TickRecord& tick, std::span<const VoxelChange> changes) noexcept {
+  /// A tick: the records of all hands, and their changes in the same order.
+  void publish(std::span<const TickRecord> hands, std::span<const VoxelChange> changes) noexcept {
     for_each([&](StreamReader& r) {
-      if (r.first_tick.load(std::memory_order_relaxed) == StreamReader::kNone) r.first_tick.store(tick.tick, std::memory_order_relaxed);
+      if (r.first_tick.load(std::memory_order_relaxed) == StreamReader::kNone)
+        r.first_tick.store(hands.front().tick, std::memory_order_relaxed);
       // Both or neither: a reader pairs changes with ticks by their counts.
-      if (r.ticks.room() < 1 || !r.changes.push(changes)) {
+      if (r.ticks.room() < hands.size() || !r.changes.push(changes)) {
         r.dropped.fetch_add(1, std::memory_order_relaxed);
       } else {
-        r.ticks.push(tick);
+        r.ticks.push(hands);
       }
     });
   }
+  void publish(const TickRecord& tick, std::span<const VoxelChange> changes) noexcept { publish({&tick, 1}, changes); }
 
  private:
   // Odd while it runs. Who leaves empties its slot and then looks at this number, the servo raises it and then looks at the slots: in one

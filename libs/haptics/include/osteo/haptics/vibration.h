@@ -31,8 +31,9 @@ struct VibrationSpectrum {
 class Vibration {
  public:
   explicit Vibration(VibrationSpectrum spectrum) : spectrum_(std::move(spectrum)) {}
-  /// Components along two directions at right angles to the axis, N.
-  std::array<double, 2> step(BurrKind kind, double pressed_n, double dt_s) noexcept;
+  /// Components along two directions at right angles to the axis, N. `speed`: of the burr, as a share of the one that the spectrum was
+  /// taken at: frequencies and amplitudes go with it (the amplitudes: a guess).
+  std::array<double, 2> step(BurrKind kind, double pressed_n, double dt_s, double speed = 1) noexcept;
 
  private:
   VibrationSpectrum spectrum_;

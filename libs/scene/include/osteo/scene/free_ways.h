@@ -21,8 +21,8 @@ struct ToolSkin {
   std::vector<Point> points;
   double reach_mm = 0;  ///< from the hand's position to the farthest of them
 };
-/// A burr with its shaft, or with `head` false the shaft alone.
-[[nodiscard]] ToolSkin skin_of_burr(std::size_t tool, bool head = true);
+/// An instrument with its shaft, or with `head` false the shaft alone.
+[[nodiscard]] ToolSkin skin_of_instrument(std::size_t tool, bool head = true);
 /// A plate as it is gripped.
 [[nodiscard]] ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip);
 

@@ -14,7 +14,10 @@ namespace osteo {
 /// clock, nothing is removed (an action of its own in the stream, ActionKind::hold), so the outcome follows from the stream alone.
 class Operation {
  public:
-  /// What is given by reference must outlive this.
+  /// What is given by reference must outlive this. As many devices as the setup has hands.
+  Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, std::span<Device* const> devices, Stream& stream,
+            double rate_hz);
+  /// Of one hand.
   Operation(World world, const HapticSetup& setup, const Anatomy& anatomy, Device& device, Stream& stream, double rate_hz);
 
   bool step(std::int64_t lateness_ns) noexcept { return servo_.step(lateness_ns); }
@@ -22,7 +25,10 @@ class Operation {
   void finish() noexcept { servo_.finish(); }
   [[nodiscard]] std::uint64_t ticks() const { return servo_.ticks(); }
   [[nodiscard]] double removed_mm3() const { return servo_.removed_mm3(); }
+  [[nodiscard]] bool active() const noexcept { return servo_.active(); }
   [[nodiscard]] const World& world() const { return world_; }
+  /// With the settings as the last action has left them; in the thread that acts.
+  [[nodiscard]] const HapticSetup& setup() const { return setup_; }
   [[nodiscard]] const HapticRenderer& renderer() const { return renderer_; }
   /// To be told of the stream by whoever acts, in the same thread; without it undo knows nothing of the burr's strokes.
   [[nodiscard]] Reader& strokes() { return strokes_; }
@@ -42,9 +48,13 @@ class Operation {
 
  private:
   void hand_over(const SceneAction& action, std::unique_ptr<HapticScene> scene);
+  World::Effect apply(const SceneAction& action, const World::ComponentsOf& components);
+  [[nodiscard]] bool needs_hold(const SceneAction& action) const;
 
   World world_;
   StrokeReader strokes_{world_};
+  HapticSetup setup_;
+  HapticsParams given_;  // to the servo, until it has taken them
   HapticRenderer renderer_;
   Servo servo_;
   std::unique_ptr<HapticScene> scene_, old_scene_;

@@ -1,5 +1,6 @@
 // Who follows the stream of a rehearsal, or of a session that is replayed.
 #pragma once
+#include <array>
 #include <deque>
 #include <map>
 #include <optional>
@@ -27,7 +28,8 @@ class Reader {
   }
   /// At the beginning of its tick: after all ticks before it, before what changes in it. scene_changed() calls come in the same order.
   virtual void action(const SceneAction& action) { static_cast<void>(action); }
-  /// What was recorded in a tick, in order, and the voxels it changed (the density before each change too).
+  /// What was recorded of a hand in a tick, and the voxels it changed (the density before each change too). Ticks in order, of each tick the
+  /// hands in theirs.
   virtual void tick(const TickRecord& record, std::span<const VoxelChange> changes) {
     static_cast<void>(record);
     static_cast<void>(changes);
@@ -56,8 +58,8 @@ class ReaderHub {
   void end(std::uint64_t ticks);
 
   [[nodiscard]] std::uint64_t ticks_lost() const { return ticks_lost_; }
-  /// The last record taken.
-  [[nodiscard]] const TickRecord& latest() const { return latest_; }
+  /// The last record taken of a hand (below kMostHands).
+  [[nodiscard]] const TickRecord& latest(std::size_t hand = 0) const { return latest_[hand]; }
 
  private:
   std::size_t take_actions();
@@ -71,7 +73,7 @@ class ReaderHub {
   std::map<std::uint32_t, SceneAction> standing_;  // by kind: what goes on until the next of its kind: sucker, water
   std::vector<TickRecord> ticks_;
   std::vector<VoxelChange> changes_;
-  TickRecord latest_;
+  std::array<TickRecord, kMostHands> latest_;
   std::optional<std::uint64_t> next_tick_;
   std::uint64_t ticks_lost_ = 0, actions_dropped_ = 0;
 };

@@ -17,6 +17,7 @@
 #include "osteo/scene/scene_readers.h"
 #include "osteo/scene/soft_body.h"
 #include "osteo/session/recorder.h"
+#include "osteo/session/script.h"
 #include "osteo/session/session_reader.h"
 
 namespace osteo {
@@ -73,6 +74,9 @@ struct RehearsalSummary {
 /// follower's thread drains it for all readers and changes the scene. Who holds which lock: docs/threads.md.
 class Rehearsal {
  public:
+  /// As many devices as options.haptics has hands, in their order. Error(usage) when they are not as many; cannot_write.
+  Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, const RehearsalOptions& options, const Context& context);
+  /// Of one hand.
   Rehearsal(World world, std::unique_ptr<Device> device, const RehearsalOptions& options, const Context& context);
   ~Rehearsal();
 
@@ -88,7 +92,8 @@ class Rehearsal {
   /// Same bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
-  /// From any thread: soon, in the order they were asked for. A move, grip, opening or sucker that waits is replaced by the next one.
+  /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is enough
+  /// (ActionRow::last_counts).
   void act(const SceneAction& action);
   /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
   void note(const std::string& kind, const std::string& json);
@@ -101,8 +106,8 @@ class Rehearsal {
   /// well.
   [[nodiscard]] std::string trouble() const;
 
-  /// Latest tick, for display.
-  [[nodiscard]] TickRecord latest() const { return latest_.load(); }
+  /// Latest tick of a hand, for display.
+  [[nodiscard]] TickRecord latest(std::size_t hand = 0) const { return latest_[hand].load(); }
   [[nodiscard]] double removed_mm3() const { return operation_.removed_mm3(); }
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
@@ -114,8 +119,10 @@ class Rehearsal {
   [[nodiscard]] double rate_hz() const { return options_.rate_hz; }
   /// Edge of the finest voxels in the scene.
   [[nodiscard]] double finest_voxel_mm() const { return finest_voxel_mm_; }
-  [[nodiscard]] double stiffness_n_per_mm() const { return operation_.renderer().stiffness_n_per_mm(); }
-  [[nodiscard]] Device& device() { return *device_; }
+  [[nodiscard]] std::size_t hands() const { return devices_.size(); }
+  [[nodiscard]] Device& device(std::size_t hand = 0) { return *devices_[hand]; }
+  /// The settings as the last action has left them.
+  [[nodiscard]] HapticsParams settings() const;
   /// Null where the scene has none; under look() only.
   [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
@@ -138,18 +145,18 @@ class Rehearsal {
   bool run_on(const Context& context);
   RehearsalSummary finish();
 
-  std::unique_ptr<Device> device_;
+  std::vector<std::unique_ptr<Device>> devices_;
   RehearsalOptions options_;
   double voxel_mm3_, finest_voxel_mm_;
   Stream stream_;
   std::unique_ptr<Recorder> recorder_;
   Operation operation_;
   ReaderHub hub_;
-  Seqlock<TickRecord> latest_;
+  std::array<Seqlock<TickRecord>, kMostHands> latest_;
   std::atomic<double> tissue_mm3_{0};
   std::atomic<int> pieces_{0};
   std::unique_ptr<FixedRateLoop> loop_;
-  std::mutex mutex_;  // of world and readers
+  mutable std::mutex mutex_;  // of world and readers
   std::unique_ptr<SceneReaders> readers_;
   std::mutex queue_mutex_;
   std::deque<SceneAction> timed_, queue_;

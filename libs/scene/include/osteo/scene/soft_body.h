@@ -1,5 +1,6 @@
 // Soft tissue in a rehearsal: deforms under the tool beside the servo, and tells it what it pushes with.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -13,17 +14,17 @@ namespace osteo {
 
 /// The tool as soft tissue meets it.
 struct SoftTool {
-  Vec3 at_mm;            ///< centre of the tip
-  Vec3 axis{0, 0, 1};    ///< unit, from burr to handle
-  std::size_t burr = 0;  ///< index in burr_library()
-  bool turns = false;    ///< the drill is on
+  Vec3 at_mm;             ///< centre of the tip
+  Vec3 axis{0, 0, 1};     ///< unit, from tip to handle
+  std::uint8_t tool = 0;  ///< index in instrument_library()
+  bool turns = false;     ///< a burr that turns
 };
 
 /// A body of voxels by the fast model (libs/tissue). Its steps in time run a hundred times a second beside the servo; what the hand feels
 /// between them is a plane: the force now, along its own direction, rising with depth. Each such plane is an action of the stream, so a
-/// replay needs no tissue. It meets the head of the burr in its own shape, and the bone as it is now: where it lies in bone at rest it has
-/// grown on it, until the bone there is drilled away.
-/// A burr that turns cuts voxels off, by force and time as in bone, kEasierThanBone times as fast; what comes loose is gone with them.
+/// replay needs no tissue. It meets the head of the instrument in its own shape, and the bone as it is now: where it lies in bone at rest
+/// it has grown on it, until the bone there is drilled away. A burr that turns cuts voxels off, by force and time as in bone,
+/// kEasierThanBone times as fast; what comes loose is gone with them.
 class SoftBody {
  public:
   /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn instead of the

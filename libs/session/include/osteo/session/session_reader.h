@@ -30,7 +30,10 @@ struct SessionOutline {
 
   std::vector<const RecordField*> tick_fields;        ///< those of ours that the file has
   std::map<std::uint32_t, std::string> action_names;  ///< as the file has them
-  std::vector<std::string> tools;                     ///< names of its burrs
+  std::vector<std::string> tools;                     ///< names of its instruments
+  /// Of its settings, under the numbers that its `setting` actions carry in the file; read, they carry the numbers of this build, kNobody
+  /// where it has no such setting (then it is not replayable).
+  std::vector<std::string> setting_names;
   std::string not_replayable;                         ///< why this build's servo cannot repeat it; empty: it can
   std::vector<std::string> newer;                     ///< what it holds that this build does not know and leaves out, each in a line
 

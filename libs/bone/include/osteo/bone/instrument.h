@@ -1,0 +1,48 @@
+// What a hand can hold but plates: burrs, suckers, irrigators, probes. One library, one number each.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "osteo/base/param.h"
+#include "osteo/bone/burr.h"
+#include "osteo/bone/round_cone.h"
+
+namespace osteo {
+
+enum class InstrumentKind : int { burr, sucker, irrigator, probe };
+template <>
+struct EnumNames<InstrumentKind> {
+  static constexpr std::array<std::string_view, 4> values{"burr", "sucker", "irrigator", "probe"};
+};
+
+/// All of them are felt when they touch bone; what they do besides needs the pedal.
+struct Instrument {
+  InstrumentKind kind = InstrumentKind::burr;
+  std::string name;            ///< "cutting 4 mm", "sucker 8 Fr", "irrigator 2 mm", "probe 1 mm", "hook 2 mm"
+  RoundCone head;              ///< its tip's centre at the origin, handle along +z
+  RoundCone shaft;             ///< behind it, in the same frame
+  int burr = -1;               ///< index in burr_library(); -1: none, it removes nothing
+  double rate = 0;             ///< sucker: mm3 of dust a second; irrigator: share of the dust that it carries away in a second; pedal down
+  double reach_mm = 0;         ///< of those two, around the tip's centre
+  double falloff_per_rad = 0;  ///< burr: share of its efficiency lost for each radian of latitude
+
+  [[nodiscard]] const Burr* as_burr() const { return burr < 0 ? nullptr : &burr_library()[static_cast<std::size_t>(burr)]; }
+};
+
+/// Burrs first, under their numbers in burr_library(); then suckers of 5, 7, 8, 10 and 12 French, an irrigator, a blunt probe, a hook.
+/// A tool is named by its index here, also in session files. Suckers: straight tubes as thick as the French scale says (a third of a
+/// millimetre each; sizes as the Frazier pattern is sold in), closed at the tip by a dome. What they suck is a guess: 60 mm3/s within 4 mm
+/// at 10 French, in proportion to the lumen's area and to its diameter. The hook's bent tip is felt as a ball around it.
+[[nodiscard]] const std::vector<Instrument>& instrument_library();
+/// Error(usage), with all names, when there is none.
+[[nodiscard]] int instrument_index(std::string_view name);
+/// The instrument of a sample; the last where there is none under its number.
+[[nodiscard]] const Instrument& instrument_of(std::uint8_t tool);
+
+/// Depths of flat cuts of each instrument's head, and of its shaft; made once, at the first call.
+[[nodiscard]] const CutDepth& head_cut_depth(std::size_t tool);
+[[nodiscard]] const CutDepth& shaft_cut_depth(std::size_t tool);
+
+}  // namespace osteo
