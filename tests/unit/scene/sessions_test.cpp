@@ -8,6 +8,7 @@
 
 #include "bar.h"
 #include "osteo/base/error.h"
+#include "osteo/base/files.h"
 #include "osteo/scene/rehearsal.h"
 #include "other_session.h"
 #include "rewrite_session.h"
