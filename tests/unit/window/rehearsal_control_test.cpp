@@ -178,14 +178,21 @@ TEST(RehearsalControl, SuckerAndWaterGoWithTheirKeys) {
   RehearsalControl control = sitting.control();
   control.look_from(kFromAbove);
   ASSERT_TRUE(control.begin(true, false));
+  const auto for_a_while = [&] {
+    const std::uint64_t tick = control.rehearsal().latest().tick;
+    ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().tick > tick + 50; }));
+  };
   control.wash(true, false);
   EXPECT_TRUE(control.sucking());
   EXPECT_FALSE(control.washing());
+  for_a_while();
   control.wash(false, true);
   EXPECT_FALSE(control.sucking());
   EXPECT_TRUE(control.washing());
+  for_a_while();
   control.wash(false, false);
   control.wash(false, false);  // nothing more
+  for_a_while();
   sitting.running->stop();
   const Session session = read_session(sitting.scratch / "1.oss");
   std::string done;
