@@ -74,8 +74,30 @@ def same_actions(what, rows):
     print(f"ok  {what}: {len(rows)} actions, equal")
 
 
+# Notes, in a frame of their own before the end: one that is known and one that is not.
+notes = [{"tick": 7, "kind": "camera", "value": {"eye_mm": [1, 2.5, 3], "view_angle_deg": 30}}, {"tick": 1999, "kind": "twitch", "value": "\u00e4, \"b\""}]
+text = "".join(json.dumps(n) + "\n" for n in notes).encode()
+payload = read_session.zstandard.compress(struct.pack("<II", session["header"]["records"]["note"]["part"], len(text)) + text)
+head = struct.pack("<II", read_session.RECORDS, len(payload)) + struct.pack("<QQ", 2000, 2000)
+frame = b"OSF2" + head[:8] + struct.pack("<I", zlib.crc32(head + payload)) + head[8:] + payload
+raw, at = stream.read_bytes(), 0
+while struct.unpack_from("<I", raw, at + 4)[0] != read_session.END:
+    at += 32 + struct.unpack_from("<I", raw, at + 8)[0]
+stream.write_bytes(raw[:at] + frame + raw[at:])
+assert read_session.read(stream)["note"] == notes
+
 for ending in ("csv", "h5", "mcap"):
     osteo("export", "session", f"out.{ending}")
+with open(work / "out-notes.csv") as f:
+    assert [(int(r["tick"]), r["kind"], json.loads(r["json"])) for r in csv.DictReader(f)] == [tuple(n.values()) for n in notes]
+with h5py.File(work / "out.h5") as f:
+    g = f["notes"]
+    assert [(int(t), k.decode(), json.loads(v)) for t, k, v in zip(g["tick"], g["kind"], g["json"])] == [tuple(n.values()) for n in notes]
+with open(work / "out.mcap", "rb") as f:
+    told = [json.loads(m.data) for _, _, m in SeekingReader(f).iter_messages(topics=["/notes"])]
+    assert [{k: n[k] for k in ("tick", "kind", "value")} for n in told] == notes and told[1]["time_s"] == 1.999
+print(f"ok  notes: {len(notes)} in CSV, HDF5, MCAP")
+osteo("replay", "session")
 left = sorted(p.name for p in work.iterdir() if p.name.startswith((".", "out")))
 assert left == ["out-actions.csv", "out-notes.csv", "out.csv", "out.h5", "out.mcap"], left
 with open(work / "out.csv") as f:
@@ -106,14 +128,14 @@ with open(work / "out.mcap", "rb") as f:
     summary = reader.get_summary()
     indexed = [m.data for _, c, m in reader.iter_messages(topics=["/ticks"])]
     later = [m.log_time for _, _, m in reader.iter_messages(start_time=1_500_000_000)]
-assert summary.statistics.message_count == len(messages) == 2004 and summary.statistics.chunk_count == len(summary.chunk_indexes) > 1
-assert {c.topic for c in summary.channels.values()} == {"/ticks", "/actions", "/gaps", "/notes"} and min(later) == 1_500_000_000 and len(later) == 501
+assert summary.statistics.message_count == len(messages) == 2006 and summary.statistics.chunk_count == len(summary.chunk_indexes) > 1
+assert {c.topic for c in summary.channels.values()} == {"/ticks", "/actions", "/gaps", "/notes"} and min(later) == 1_500_000_000 and len(later) == 502
 ticks_m = [m for _, c, m in messages if c.topic == "/ticks"]
 assert indexed == [m.data for m in ticks_m]
 records = [json.loads(d) for d in indexed]
 same("MCAP", {n: np.float32([r[n] for r in records]) for n in names})
 assert messages[0][0].encoding == "jsonschema" and ticks_m[1].log_time == 1_000_000
-assert [m.log_time for _, _, m in messages] == sorted(m.log_time for _, _, m in messages)
+assert [m.log_time for _, c, m in messages if c.topic != "/notes"] == sorted(m.log_time for _, c, m in messages if c.topic != "/notes")
 schema = json.loads(next(s for s in summary.schemas.values() if s.name == "osteotome.Tick").data)
 assert schema["properties"]["x_mm"]["unit"] == "mm"
 acted = [json.loads(m.data) for _, c, m in messages if c.topic == "/actions"]

@@ -13,15 +13,22 @@ inline void rewrite_session(const std::filesystem::path& from, const std::filesy
   std::filesystem::remove(to);
   SessionWriter writer(to, reader.header());
   auto parts = reader.parts();
+  // Whole frames: a checkpoint stands behind the changes of its ticks.
+  SessionBatch frame;
+  const auto end_frame = [&] {
+    change(frame);
+    writer.append(frame);
+    frame = {};
+  };
   while (const SessionPart* const p = parts.next()) {
+    if (!p->actions.empty() || (!p->ticks.empty() && !frame.ticks.empty()) || p->gap != nullptr) end_frame();
     if (p->gap != nullptr) writer.append(RecordingGap{p->gap->first_tick, p->gap->ticks, p->gap->bone_lost});
-    SessionBatch b{{p->actions.begin(), p->actions.end()},
-                   {p->ticks.begin(), p->ticks.end()},
-                   {p->changes.begin(), p->changes.end()},
-                   {p->notes.begin(), p->notes.end()}};
-    change(b);
-    writer.append(b);
+    frame.actions.insert(frame.actions.end(), p->actions.begin(), p->actions.end());
+    frame.ticks.insert(frame.ticks.end(), p->ticks.begin(), p->ticks.end());
+    frame.changes.insert(frame.changes.end(), p->changes.begin(), p->changes.end());
+    frame.notes.insert(frame.notes.end(), p->notes.begin(), p->notes.end());
   }
+  end_frame();
   if (reader.outline().end) writer.finish(*reader.outline().end);
 }
 

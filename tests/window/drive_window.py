@@ -360,10 +360,10 @@ def failures():
 
         # A disk that is full: by a limit on the size of files. The window ends with the reason, whatever key comes first.
         def full():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 
         w = Window("-o", "full", before=full)
-        wait("the file is as large as it may be", lambda: pathlib.Path("full/stream.oss").stat().st_size > 100_000)
+        wait("the file is as large as it may be", lambda: pathlib.Path("full/stream.oss").stat().st_size > 40_000)
         w.next(4)
         if not w.state()["failure"]:
             w.x("key", "F5")

@@ -249,6 +249,7 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
+  for (const std::string& line : outline.newer) io.err << "session: of a later version, left out: " << line << '\n';
   const bool whole = outline.gaps.empty();
   if (!whole) {
     io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "

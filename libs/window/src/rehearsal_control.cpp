@@ -330,6 +330,7 @@ void RehearsalControl::wash(bool suck, bool wash) {
 void RehearsalControl::say(const std::string& text) {
   message_ = text;
   message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+  if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text);
 }
 
 std::string RehearsalControl::told() const {

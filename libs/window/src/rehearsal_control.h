@@ -80,7 +80,7 @@ class RehearsalControl {
   [[nodiscard]] bool washing() const { return washing_; }
 
   // --- what is told
-  void say(const std::string& text);
+  void say(const std::string& text);  ///< also a note of the session
   /// The last thing said.
   [[nodiscard]] const std::string& message() const { return message_; }
   /// What to show now; empty: nothing.

@@ -54,7 +54,7 @@ struct RecordingGap {
 struct Note {
   std::uint64_t tick = 0;
   std::string kind;  ///< one word
-  std::string json;  ///< its value
+  std::string json;  ///< its value; what is no JSON is kept as a text
 };
 
 /// A piece of the stream: first the actions, then the ticks, then what these changed. An action that looks at densities may not stand
