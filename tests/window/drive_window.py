@@ -195,13 +195,14 @@ def keys():
         w.x("key", "v")
         w.next(4)
         second = key("F5", "another session", lambda s: s["session"] != first and s["tick"] > 0)["session"]
-        # Saw, take apart, move, plate, back.
+        # Saw, take apart, move, plate, back. What was drilled in the sessions before can be taken back as well.
+        before = w.state()["undo_steps"]
         saw = key("x", "saw", lambda s: s["hand"] == "saw")
         left = key("a", "saw turned", lambda s: apart(s["cut_along"], saw["cut_along"]) > 0.05)
         key("e", "saw turned back", lambda s: apart(s["cut_along"], saw["cut_along"]) < 1e-6 and s != left)
-        key("Return", "cut", lambda s: s["undo_steps"] == 1)
-        key("z", "uncut", lambda s: s["undo_steps"] == 0)
-        key("KP_Enter", "cut again", lambda s: s["undo_steps"] == 1)
+        key("Return", "cut", lambda s: s["undo_steps"] == before + 1)
+        key("z", "uncut", lambda s: s["undo_steps"] == before)
+        key("KP_Enter", "cut again", lambda s: s["undo_steps"] == before + 1)
         key("Escape", "drill", lambda s: s["hand"] == "drill")
         key("p", "pieces", lambda s: s["hand"] == "piece")
         apart_now = key("Return", "taken apart", lambda s: s["bodies"] > 1)

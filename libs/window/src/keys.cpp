@@ -91,7 +91,7 @@ const std::vector<HelpLine>& help_lines() {
                                               {"L", "plate in the hand, moved like the drill", {plates}},
                                               {"A, E", "turn the saw, the piece or the plate", {turn_left, turn_right}},
                                               {"Enter", "cut; take apart; fix the plate", {perform}},
-                                              {"Z", "takes back the last cut, move, plate", {undo}},
+                                              {"Z", "takes back the last stroke, cut, move, plate", {undo}},
                                               {"Esc", "back to the drill", {put_away}},
                                               {"M", "marks this moment in the session", {mark}},
                                               {"S", "screenshot into the session's folder", {screenshot}},

@@ -24,21 +24,20 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <new>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "camera_notes.h"
 #include "cuts_panel.h"
 #include "gamepad.h"
 #include "help_panel.h"
-#include "keys.h"
 #include "osteo/base/error.h"
 #include "osteo/io/surface_io.h"
-#include "osteo/scene/free_ways.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
 #include "osteo/view/world_view.h"
+#include "rehearsal_control.h"
 #include "scene_tools.h"
 #include "status_panel.h"
 #include "window_state.h"
@@ -52,13 +51,18 @@ constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 class RehearsalWindow {
  public:
   RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
-      : actions_(actions), scan_(options.scan), state_file_(options.state_file), tool_(options.tool), device_name_(options.device) {
+      : control_(actions, options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
+        actions_(actions),
+        scan_(options.scan),
+        state_file_(options.state_file),
+        device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
     make_scene();
     look_from(kFromLeft);
     show_words("loading the case");
-    attempt(options.from_case, false);
+    control_.look_from(view_axes());
+    control_.begin(options.from_case, false);
     look_from(kFromLeft);
   }
 
@@ -78,10 +82,10 @@ class RehearsalWindow {
   RehearsalWindow& operator=(const RehearsalWindow&) = delete;
 
   int run() {
-    if (failure_) throw Error(*failure_);  // nothing was begun
+    if (control_.failure()) throw Error(*control_.failure());  // nothing was begun
     while (glfwWindowShouldClose(window_) == 0 && !quit_ && !actions_.stop()) frame();
-    if (failure_) throw Error(*failure_);
-    if (lost_) throw Error(*lost_);
+    if (control_.failure()) throw Error(*control_.failure());
+    if (control_.lost()) throw Error(*control_.lost());
     return gl_errors_;
   }
 
@@ -147,274 +151,25 @@ class RehearsalWindow {
       hand.shaft->GetProperty()->SetColor(0.62, 0.66, 0.72);
       hand.shaft->GetProperty()->SetSpecular(0.5);
     }
-    set_tool(tool_);
+    draw_instrument(drawn_[0], control_.tool());
   }
 
-  // The running rehearsal has another bone: show it.
-  void new_bone() {
-    Rehearsal& rehearsal = *actions_.rehearsal();
+  // A rehearsal has begun, perhaps with another bone.
+  void show_bone(Rehearsal& rehearsal) {
     world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
-    Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    rehearsal.look([&](const World& world, SceneReaders& readers) {
-      world_view_->update(world, readers);
-      const BrickGrid& bone = world.bodies().front().body->bone;
-      for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-        const Ijk o = bone.brick_coordinate(b);
-        const Vec3 p = bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
-        for (std::size_t a = 0; a < 3; ++a) {
-          lo[a] = std::min(lo[a], p[a]);
-          hi[a] = std::max(hi[a], p[a]);
-        }
-      }
-    });
-    centre_ = (lo + hi) * 0.5;
-    radius_ = std::max(5.0, 0.5 * length(hi - lo));
+    rehearsal.look([&](const World& world, SceneReaders& readers) { world_view_->update(world, readers); });
     if (!tools_) tools_ = std::make_unique<SceneTools>(renderer_);
-    tools_->renew(centre_, 2 * radius_);
     cuts_.renew();
   }
 
-  void look_from(Vec3 eye) { look_at(renderer_, centre_, 0.8 * radius_, normalized(eye)); }
+  void look_from(Vec3 eye) { look_at(renderer_, control_.centre_mm(), 0.8 * control_.radius_mm(), normalized(eye)); }
 
-  // --- sessions ---------------------------------------------------------------------------------------------------
-
-  // Saves what runs, where asked, and begins anew. False: something failed, and the window says what.
-  bool attempt(bool from_case, bool save_first) {
-    failure_.reset();
-    leading_.reset();
-    ran_ = drill_latched_ = sucking_ = washing_ = false;
-    const bool saved = !save_first || guarded([&] { actions_.save(); });
-    if (!saved) lost_ = failure_;
-    const bool begun = saved && guarded([&] {
-                         goal_ = actions_.begin(from_case, {towards_eye(), wanted_axis(), tool_});
-                         axis_ = from_floats(goal_.axis);
-                         new_bone();
-                       });
-    // A session that nobody can see is closed, with the reason kept.
-    if (saved && !begun && actions_.rehearsal() != nullptr) {
-      const std::optional<Error> why = failure_;
-      guarded([&] { actions_.save(); });
-      failure_ = why;
-    }
-    return begun;
-  }
-
-  template <class F>
-  bool guarded(F&& f) {
-    try {
-      f();
-      return true;
-    } catch (const Error& e) {
-      failure_ = e;
-    } catch (const std::bad_alloc&) {
-      failure_ = Error(ExitCode::resources, "out of memory");
-    } catch (const std::exception& e) {
-      failure_ = Error(ExitCode::unspecified, std::string("unexpected: ") + e.what(), "this is a defect of the program; please report it");
-    }
-    return false;
-  }
-
-  // What can no longer be recorded is ended; a rehearsal that has ended without having been asked to says why when it is closed.
-  void watch() {
-    const Rehearsal* const rehearsal = actions_.rehearsal();
-    if (rehearsal == nullptr || failure_) return;
-    if (const std::optional<Error> failed = actions_.failure()) {
-      guarded([&] {
-        actions_.save();
-        throw Error(*failed);
-      });
-      lost_ = failure_;
-    } else if (rehearsal->running()) {
-      ran_ = true;
-    } else if (ran_) {
-      guarded([&] {
-        actions_.save();
-        throw Error(ExitCode::failed, "the session has ended by itself; it is saved", "please report this with the session");
-      });
-      lost_ = failure_;
-    }
-  }
-
-  void reset() {
-    if (attempt(true, true)) say("the bone is whole again; the session before was saved");
-  }
-
-  void save() {
-    if (attempt(false, true)) say("saved; a new session goes on from here");
-  }
-
-  // --- the hand ---------------------------------------------------------------------------------------------------
+  // --- the view ---------------------------------------------------------------------------------------------------
 
   [[nodiscard]] Vec3 view_direction() const {
     double d[3];
     renderer_->GetActiveCamera()->GetDirectionOfProjection(d);
     return {d[0], d[1], d[2]};
-  }
-
-  [[nodiscard]] Vec3 towards_eye() const {
-    double p[3];
-    renderer_->GetActiveCamera()->GetPosition(p);
-    return normalized(Vec3{p[0], p[1], p[2]} - centre_);
-  }
-
-  [[nodiscard]] bool plate_in_hand() const { return tools_ && tools_->tool() == SceneTools::Tool::plate; }
-
-  // A drill is held from the right; a plate lies flat against what one looks at.
-  [[nodiscard]] Vec3 wanted_axis() const {
-    const Vec3 forward = view_direction();
-    double up[3];
-    renderer_->GetActiveCamera()->GetViewUp(up);
-    const Vec3 right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
-    return plate_in_hand() ? forward * -1 : normalized(right * 0.62 + above * 0.45 - forward * 0.64);
-  }
-
-  // Where the hand is; before the first tick, where it will be.
-  [[nodiscard]] HandPose hand_pose(Rehearsal& rehearsal) const {
-    const TickRecord tick = rehearsal.latest();
-    if (tick.tick == 0) return {goal_.position_mm, from_floats(goal_.axis)};
-    return {from_floats(tick.device.position_mm), from_floats(tick.device.axis)};
-  }
-
-  [[nodiscard]] bool outside(Rehearsal& rehearsal) const {
-    const FreeWays ways = free_ways(rehearsal, true);
-    return length(hand_pose(rehearsal).at_mm - ways.centre_mm()) > ways.radius_mm();
-  }
-
-  [[nodiscard]] FreeWays free_ways(Rehearsal& rehearsal, bool whole_tool) const {
-    const auto drill = static_cast<std::size_t>(tool_);
-    ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_->plate(), tools_->plate_grip()) : skin_of_instrument(drill, whole_tool);
-    std::optional<FreeWays> ways;
-    rehearsal.look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin)); });
-    return *std::move(ways);
-  }
-
-  // The handle follows the view, as far as bone lets it.
-  void turn_handle(Rehearsal& rehearsal, double seconds) {
-    constexpr double kRadPerS = 4;
-    const Vec3 wanted = wanted_axis();
-    if (length(wanted - axis_) < 1e-3) return;
-    axis_ = free_ways(rehearsal, false).turned({hand_pose(rehearsal).at_mm, axis_}, wanted, kRadPerS * std::min(seconds, 0.2));
-  }
-
-  void send_goal(Rehearsal& rehearsal, double seconds) {
-    Device& device = rehearsal.device();
-    device.set_tool(static_cast<std::uint8_t>(tool_));
-    if (leading_) {
-      drill_latched_ = false;
-      return;
-    }
-    auto* const mouse = dynamic_cast<MouseDevice*>(&device);
-    if (mouse == nullptr) return;  // it moves and drills by itself
-    turn_handle(rehearsal, seconds);
-    goal_.axis = to_floats(axis_);
-    goal_.tool = static_cast<std::uint8_t>(tool_);
-    goal_.pedal = drill_latched_ || drill_held_ ? 255 : 0;
-    mouse->set_goal(goal_);
-  }
-
-  // --- the hand goes somewhere by itself --------------------------------------------------------------------------
-
-  // First it lets go of the bone; then the way is found from where it is.
-  struct Leading {
-    enum class Stage { letting_go, on_the_way, put } stage = Stage::letting_go;
-    std::optional<std::uint64_t> quiet_tick;  // when it had let go: what is known of the hand may be older
-    std::optional<Vec3> seen_mm;              // bone to come down at; none: out
-    Vec3 forward;
-    std::string done;
-  };
-
-  void lead(Rehearsal& rehearsal, std::optional<Vec3> seen_mm, Vec3 forward) {
-    if (!rehearsal.device().lead({})) {
-      say("the drill is in your own hand");
-      return;
-    }
-    leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
-    drill_latched_ = false;
-    wait_for_release_ = true;
-  }
-
-  void bring_drill_to_bone(Rehearsal& rehearsal, double x, double y) {
-    // The bone under the mouse: a ray through the live voxels.
-    const Vec3 eye = view_axes().eye_mm, forward = normalized(unproject(x, y, centre_) - eye);
-    std::optional<BoneHit> hit;
-    rehearsal.look([&](const World& world, SceneReaders&) { hit = bone_on_ray(world, eye, forward, length(centre_ - eye) + 4 * radius_); });
-    if (!hit) {
-      say("no bone under the mouse");
-      return;
-    }
-    lead(rehearsal, hit->at_mm, forward);
-  }
-
-  void go_on_leading(Rehearsal& rehearsal) {
-    if (!leading_) return;
-    Device& device = rehearsal.device();
-    const Led led = device.led();
-    if (led == Led::on_the_way) return;
-    const auto go = [&](Leading::Stage stage, const HandWay& way, const HandPose& end) {
-      leading_->stage = stage;
-      goal_.position_mm = end.at_mm;
-      axis_ = end.axis;
-      goal_.axis = to_floats(axis_);
-      goal_.pedal = 0;
-      device.lead(way);
-    };
-    const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
-    if (leading_->stage == Leading::Stage::letting_go) {
-      const std::uint64_t tick = rehearsal.latest().tick;
-      if (!leading_->quiet_tick) leading_->quiet_tick = tick;
-      if (tick <= *leading_->quiet_tick) return;
-      const FreeWays ways = free_ways(rehearsal, true);
-      const HandPose from = hand_pose(rehearsal);
-      if (leading_->seen_mm) {
-        const FreeWays::Approach a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
-        const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr_library()[static_cast<std::size_t>(tool_)].diameter_mm / 2;
-        char far[80];
-        std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
-        leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there"
-                         : gap > 6 ? far
-                                   : "drill brought to the bone";
-        go(Leading::Stage::on_the_way, a.way, a.end);
-      } else {
-        const HandPose to = waiting(ways);
-        const HandWay way = ways.way(from, to);
-        leading_->done = way.put ? "the drill was shut in; it was taken out" : "drill lifted out";
-        go(Leading::Stage::on_the_way, way, to);
-      }
-    } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
-      leading_->done = "the drill was stuck; it was taken out";
-      const HandPose to = waiting(free_ways(rehearsal, true));
-      HandWay way;
-      way.put = true;
-      way.points[0] = {to.at_mm, to_floats(to.axis), false};
-      way.count = 1;
-      go(Leading::Stage::put, way, to);
-    } else {
-      say(leading_->done);
-      leading_.reset();
-    }
-  }
-
-  // The same burr but for one property.
-  void set_kind(BurrKind kind) {
-    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
-    set_tool(burr_index(kind, b.diameter_mm, b.shape));
-  }
-  void set_diameter(int diameter_mm) {
-    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
-    set_tool(burr_index(b.kind, diameter_mm, b.shape));
-  }
-  void set_shape(BurrShape shape) {
-    const Burr& b = burr_library()[static_cast<std::size_t>(tool_)];
-    set_tool(burr_index(b.kind, b.diameter_mm, shape));
-  }
-
-  void set_tool(int tool) {
-    if (leading_) {  // on a way that was found for the burr that it has
-      say("the drill is on its way: change the burr when it has arrived");
-      return;
-    }
-    tool_ = tool;
-    draw_instrument(drawn_[0], tool);
   }
 
   // What a hand is drawn as.
@@ -451,24 +206,30 @@ class RehearsalWindow {
     return {{p[0], p[1], p[2]}, forward, right, cross(right, forward)};
   }
 
+  // From the eye through a place of the window.
+  [[nodiscard]] Vec3 ray(double x, double y) {
+    const Vec3 eye = view_axes().eye_mm;
+    return normalized(unproject(x, y, control_.centre_mm()) - eye);
+  }
+
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
     glfwPollEvents();
     glfwGetFramebufferSize(window_, &width_, &height_);
-    watch();
+    control_.watch();
+    control_.look_from(view_axes());
     if (width_ < 200 || height_ < 150) {  // put away
       write_state();
       glfwWaitEventsTimeout(0.05);
       return;
     }
     begin_picture();
-    if (failure_) {
+    if (control_.failure()) {
       tell_failure();
     } else {
-      Rehearsal& rehearsal = *actions_.rehearsal();
-      mouse_and_keys(rehearsal);
-      if (!failure_) show(*actions_.rehearsal());  // F5 and R make another
+      mouse_and_keys();
+      if (!control_.failure()) show();
     }
     end_picture();
     ++pictures_;
@@ -481,17 +242,19 @@ class RehearsalWindow {
     ImGui::NewFrame();
   }
 
-  void show(Rehearsal& rehearsal) {
-    panel(rehearsal);
-    if (failure_) return;
-    Rehearsal& now = *actions_.rehearsal();
-    cuts_.draw(now, tool_, {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
+  void show() {
+    panel();
+    if (control_.failure()) return;
+    Rehearsal& now = control_.rehearsal();
+    draw_instrument(drawn_[0], control_.tool());
+    cuts_.draw(now, control_.tool(),
+               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
     if (show_help_) draw_help(show_help_, width_);
     now.look([&](const World& world, SceneReaders& readers) {
       world_view_->update(world, readers);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
     });
-    world_view_->highlight(tools_->piece());
+    world_view_->highlight(control_.tools().piece());
     const TickRecord tick = now.latest();
     place_tool(drawn_[0], tick);
     for (std::size_t hand = 1; hand < now.hands(); ++hand) {
@@ -500,8 +263,8 @@ class RehearsalWindow {
       draw_instrument(drawn_[hand], other.device.tool);
       place_tool(drawn_[hand], other);
     }
-    tools_->show(tick);
-    wash(now, tick);
+    tools_->show(control_.tools(), tick);
+    control_.wash(keyboard_.held(Command::suck), keyboard_.held(Command::wash));
     note_camera(now);
   }
 
@@ -520,7 +283,7 @@ class RehearsalWindow {
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
     renderer_->SetViewport(left, 0, right, 1);
     renderer_->ResetCameraClippingRange();
-    if (world_view_ && !failure_) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
+    if (world_view_ && !control_.failure()) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -551,8 +314,8 @@ class RehearsalWindow {
     ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 240, static_cast<float>(height_) / 3});
     ImGui::SetNextWindowSize({480, 0});
     ImGui::Begin("No session runs", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-    ImGui::TextWrapped("%s", failure_->what());
-    if (!failure_->advice().empty()) ImGui::TextWrapped("%s", failure_->advice().c_str());
+    ImGui::TextWrapped("%s", control_.failure()->what());
+    if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
     ImGui::Separator();
     if (const auto folder = actions_.folder(); !folder.empty())
       ImGui::TextWrapped("What was recorded is kept: %s", folder.string().c_str());
@@ -566,26 +329,10 @@ class RehearsalWindow {
       quit_ = quit_ || press.command == Command::quit;
       screenshot_wanted_ = screenshot_wanted_ || press.command == Command::screenshot;
     }
-    if ((go_on || anew) && attempt(anew, false)) say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
+    if ((go_on || anew) && control_.begin(anew, false))
+      control_.say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
   }
 
-  // The second hand, where no device moves it: a sucker (V) or water (I) beside the burr, else out of the way.
-  void wash(Rehearsal& rehearsal, const TickRecord& tick) {
-    auto* const hand = rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;
-    if (hand == nullptr) return;
-    static const auto sucker = static_cast<std::uint8_t>(instrument_index("sucker 10 Fr"));
-    static const auto water = static_cast<std::uint8_t>(instrument_index("irrigator 2 mm"));
-    const bool suck = sucking_ = keyboard_.held(Command::suck), wash = washing_ = keyboard_.held(Command::wash);
-    const ViewAxes view = view_axes();
-    HandGoal goal;
-    goal.tool = wash && !suck ? water : sucker;
-    goal.pedal = suck || wash ? 255 : 0;
-    goal.axis = to_floats(normalized(view.right - view.forward));
-    const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
-    goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + view.right * gap;
-    if (!suck && !wash) goal.position_mm += view.right * 30 - view.forward * 40;
-    hand->set_goal(goal);
-  }
   void place_tool(DrawnHand& hand, const TickRecord& tick) {
     const Vec3 axis = normalized(from_floats(tick.device.axis));
     const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
@@ -605,7 +352,9 @@ class RehearsalWindow {
     hand.head->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
   }
 
-  void mouse_and_keys(Rehearsal& rehearsal) {
+  void mouse_and_keys() {
+    Rehearsal& rehearsal = control_.rehearsal();
+    HandTools& tools = control_.tools();
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
     const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
@@ -625,139 +374,52 @@ class RehearsalWindow {
                            unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
         camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
         camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
-      } else if (!tools_->in_hand()) {
-        use_tool(rehearsal, m, io);
-      } else if (leading_) {
-        // It goes by itself.
+      } else if (!tools.in_hand()) {
+        use_tool(tools, rehearsal, m, io);
       } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
-        goal_.position_mm += view_direction() * (0.05 * static_cast<double>(-io.MouseDelta.y));
+        control_.push_hand(0.05 * static_cast<double>(-io.MouseDelta.y));
       } else if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) {
-        goal_.position_mm = unproject(static_cast<double>(m.x), static_cast<double>(m.y), goal_.position_mm);
+        control_.move_hand(unproject(static_cast<double>(m.x), static_cast<double>(m.y), control_.goal_mm()));
       }
       if (io.MouseWheel != 0) {
         if (io.KeyCtrl) {
           camera->Dolly(std::pow(1.1, static_cast<double>(io.MouseWheel)));
-        } else if (!tools_->in_hand()) {
-          tools_->push(1.0 * static_cast<double>(io.MouseWheel), rehearsal, view_axes());
-        } else if (!leading_) {
-          goal_.position_mm += view_direction() * (0.5 * static_cast<double>(io.MouseWheel));
+        } else if (!tools.in_hand()) {
+          tools.push(1.0 * static_cast<double>(io.MouseWheel), rehearsal, view_axes());
+        } else {
+          control_.push_hand(0.5 * static_cast<double>(io.MouseWheel));
         }
       }
     }
-    // A button that was held when the hand was led away does not drill where it arrives.
-    const bool pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left);
-    if (!pressed && !leading_) wait_for_release_ = false;
-    drill_held_ = pressed && !wait_for_release_ && in_view && !io.WantCaptureMouse && tools_->tool() == SceneTools::Tool::drill;
-    gamepad(static_cast<double>(io.DeltaTime));
+    control_.look_from(view_axes());  // the mouse may have turned it
+    const std::optional<Vec3> direction = in_view ? std::optional(ray(static_cast<double>(m.x), static_cast<double>(m.y))) : std::nullopt;
     for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
-      command(press, static_cast<double>(m.x), static_cast<double>(m.y), in_view);
-      if (failure_) return;
+      if (!control_.command(press, direction)) command(press.command);
+      if (control_.failure()) return;
     }
-    Rehearsal& now = *actions_.rehearsal();  // F5 and R make another
-    // Who takes up the saw or a piece lets go of the drill: it does not stay in the bone.
-    const bool in_hand = tools_->in_hand();
-    if (in_hand_ && !in_hand && !leading_ && !outside(now)) lead(now, std::nullopt, {});
-    in_hand_ = in_hand;
-    go_on_leading(now);
-    send_goal(now, static_cast<double>(io.DeltaTime));
+    control_.hold(
+        {static_cast<double>(io.DeltaTime), ImGui::IsMouseDown(ImGuiMouseButton_Left), in_view && !io.WantCaptureMouse, read_gamepad()});
   }
 
   // Saw and pieces: what the mouse drags is not the hand.
-  void use_tool(Rehearsal& rehearsal, const ImVec2& m, const ImGuiIO& io) {
+  void use_tool(HandTools& tools, Rehearsal& rehearsal, const ImVec2& m, const ImGuiIO& io) {
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
-      const Vec3 eye = view_axes().eye_mm;
-      tools_->pick(rehearsal, eye, normalized(unproject(static_cast<double>(m.x), static_cast<double>(m.y), centre_) - eye));
+      tools.pick(rehearsal, view_axes().eye_mm, ray(static_cast<double>(m.x), static_cast<double>(m.y)));
     }
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (io.MouseDelta.x == 0 && io.MouseDelta.y == 0)) return;
-    const Vec3 at = tools_->position_mm();
+    const Vec3 at = tools.position_mm();
     const Vec3 by = unproject(static_cast<double>(m.x), static_cast<double>(m.y), at) -
                     unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), at);
     const ViewAxes view = view_axes();
-    tools_->drag(dot(by, view.right), dot(by, view.up), io.KeyShift, rehearsal, view);
+    tools.drag(dot(by, view.right), dot(by, view.up), io.KeyShift, rehearsal, view);
   }
 
-  void gamepad(double seconds) {
-    const auto pad = read_gamepad();
-    if (!pad || leading_) return;
-    double up[3];
-    renderer_->GetActiveCamera()->GetViewUp(up);
-    const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]})), above = cross(right, forward);
-    goal_.position_mm += (right * pad->right_mm_s + above * pad->up_mm_s + forward * pad->deeper_mm_s) * std::min(seconds, 0.1);
-    if (!pad->drill && !drill_held_) wait_for_release_ = false;
-    drill_held_ = drill_held_ || (pad->drill && !wait_for_release_);
-  }
-
-  void command(const Keyboard::Press& press, double x, double y, bool in_view) {
-    Rehearsal& rehearsal = *actions_.rehearsal();
-    if (tools_->key(press.command, rehearsal, view_axes())) return;
-    switch (press.command) {
-      case Command::deeper:
-        if (!leading_) goal_.position_mm += view_direction() * 0.25;
-        break;
-      case Command::back:
-        if (!leading_) goal_.position_mm -= view_direction() * 0.25;
-        break;
-      case Command::bring:
-        if (in_view) bring_drill_to_bone(rehearsal, x, y);
-        break;
-      case Command::lift:
-        lead(rehearsal, std::nullopt, {});
-        break;
-      case Command::drill:
-        drill_latched_ = !drill_latched_ && !leading_;
-        break;
-      case Command::diameter:
-        set_diameter(press.value);
-        break;
-      case Command::cutting:
-        set_kind(BurrKind::cutting);
-        break;
-      case Command::diamond:
-        set_kind(BurrKind::diamond);
-        break;
-      case Command::ball:
-        set_shape(BurrShape::ball);
-        break;
-      case Command::cylinder:
-        set_shape(BurrShape::cylinder);
-        break;
-      case Command::taper:
-        set_shape(BurrShape::taper);
-        break;
-      case Command::mark:
-        rehearsal.note("mark", "{}");
-        say("marked");
-        break;
-      case Command::screenshot:
-        screenshot_wanted_ = true;
-        break;
-      case Command::save:
-        save();
-        break;
-      case Command::reset:
-        reset();
-        break;
-      case Command::home:
-        look_from(kFromLeft);
-        break;
-      case Command::help:
-        show_help_ = !show_help_;
-        break;
-      case Command::quit:
-        quit_ = true;
-        break;
-      case Command::suck:  // while held: wash()
-      case Command::wash:
-      case Command::saw:  // the tools'
-      case Command::pieces:
-      case Command::plates:
-      case Command::turn_left:
-      case Command::turn_right:
-      case Command::perform:
-      case Command::undo:
-      case Command::put_away:
-        break;
-    }
+  // What is the window's own.
+  void command(Command command) {
+    if (command == Command::screenshot) screenshot_wanted_ = true;
+    if (command == Command::home) look_from(kFromLeft);
+    if (command == Command::help) show_help_ = !show_help_;
+    if (command == Command::quit) quit_ = true;
   }
 
   void save_screenshot() {
@@ -779,43 +441,38 @@ class RehearsalWindow {
     } while (std::filesystem::exists(path));
     try {
       save_picture(picture, path);
-      say("saved " + path.filename().string());
+      control_.say("saved " + path.filename().string());
     } catch (const Error& e) {
-      say(e.what());
+      control_.say(e.what());
     }
   }
 
   // --- panel, slices, help ------------------------------------------------------------------------------------------
 
-  void say(const std::string& text) {
-    message_ = text;
-    message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
-    if (Rehearsal* const rehearsal = actions_.rehearsal()) rehearsal->note("message", text);
-  }
-
-  void panel(Rehearsal& rehearsal) {
+  void panel() {
+    Rehearsal& rehearsal = control_.rehearsal();
     const TickRecord tick = rehearsal.latest();
     ImGui::SetNextWindowPos({0, 0});
     ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
     ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
     ImGui::Text("Burr");
-    const Burr& burr = burr_library()[static_cast<std::size_t>(tool_)];
-    if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) set_kind(BurrKind::cutting);
+    const Burr& burr = burr_library()[static_cast<std::size_t>(control_.tool())];
+    if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) control_.take_burr(BurrKind::cutting);
     ImGui::SameLine();
-    if (ImGui::RadioButton("diamond (D)", burr.kind == BurrKind::diamond)) set_kind(BurrKind::diamond);
-    if (ImGui::RadioButton("ball (B)", burr.shape == BurrShape::ball)) set_shape(BurrShape::ball);
+    if (ImGui::RadioButton("diamond (D)", burr.kind == BurrKind::diamond)) control_.take_burr(BurrKind::diamond);
+    if (ImGui::RadioButton("ball (B)", burr.shape == BurrShape::ball)) control_.take_burr(BurrShape::ball);
     ImGui::SameLine();
-    if (ImGui::RadioButton("cyl. (Y)", burr.shape == BurrShape::cylinder)) set_shape(BurrShape::cylinder);
+    if (ImGui::RadioButton("cyl. (Y)", burr.shape == BurrShape::cylinder)) control_.take_burr(BurrShape::cylinder);
     ImGui::SameLine();
-    if (ImGui::RadioButton("taper (T)", burr.shape == BurrShape::taper)) set_shape(BurrShape::taper);
+    if (ImGui::RadioButton("taper (T)", burr.shape == BurrShape::taper)) control_.take_burr(BurrShape::taper);
     int diameter = static_cast<int>(burr.diameter_mm);
-    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) set_diameter(diameter);
-    ImGui::Checkbox("drill on (left button, Space)", &drill_latched_);
+    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) control_.take_burr_of(diameter);
+    if (bool on = control_.latched(); ImGui::Checkbox("drill on (left button, Space)", &on)) control_.latch(on);
     ImGui::Separator();
-    tools_->panel(rehearsal, view_axes());
+    tools_->panel(control_.tools(), rehearsal, view_axes());
     ImGui::Separator();
-    if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) say("point at the bone and press F");
-    if (ImGui::Button("Lift the drill out (U)", {-1, 0})) lead(rehearsal, std::nullopt, {});
+    if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) control_.say("point at the bone and press F");
+    if (ImGui::Button("Lift the drill out (U)", {-1, 0})) control_.lift();
     if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
     const bool saves = ImGui::Button("Save and go on (F5)", {-1, 0});
     ImGui::Dummy({0, 6});
@@ -842,16 +499,16 @@ class RehearsalWindow {
     ImGui::Separator();
     draw_scan(scan_);
     ImGui::TextWrapped("F1: mouse and keys");
-    if (leading_ || std::chrono::steady_clock::now() < message_until_) {
+    if (const std::string told = control_.told(); !told.empty()) {
       ImGui::Separator();
-      ImGui::TextWrapped("%s", leading_ ? "the drill is on its way, off" : message_.c_str());
+      ImGui::TextWrapped("%s", told.c_str());
     }
     ImGui::End();
     // Last: the rehearsal is another one afterwards.
     if (saves) {
-      save();
+      control_.save();
     } else if (resets) {
-      reset();
+      control_.reset();
     }
   }
 
@@ -860,25 +517,25 @@ class RehearsalWindow {
     if (state_file_.empty()) return;
     WindowState state;
     state.pictures = pictures_;
-    state.failure = failure_ ? failure_->what() : "";
-    state.message = leading_ ? "on the way" : message_;
-    state.leading = leading_.has_value();
+    state.failure = control_.failure() ? control_.failure()->what() : "";
+    state.message = control_.leading() ? "on the way" : control_.message();
+    state.leading = control_.leading();
     state.session = actions_.folder();
-    state.tool = burr_library()[static_cast<std::size_t>(tool_)].name();
-    state.drill_latched = drill_latched_;
+    state.tool = burr_library()[static_cast<std::size_t>(control_.tool())].name();
+    state.drill_latched = control_.latched();
     state.help = show_help_;
-    state.sucking = sucking_;
-    state.washing = washing_;
-    state.hand = tools_ ? static_cast<int>(tools_->tool()) : 0;
-    state.cut = tools_ ? tools_->cut() : SawCut{};
-    state.plate = tools_ ? tools_->plate_grip() : RigidTransform{};
-    state.eye = towards_eye();
-    state.centre_mm = centre_;
-    state.radius_mm = radius_;
-    state.goal_mm = goal_.position_mm;
+    state.sucking = control_.sucking();
+    state.washing = control_.washing();
+    state.hand = static_cast<int>(control_.tools().tool());
+    state.cut = control_.tools().cut();
+    state.plate = control_.tools().plate_grip();
+    state.eye = control_.towards_eye();
+    state.centre_mm = control_.centre_mm();
+    state.radius_mm = control_.radius_mm();
+    state.goal_mm = control_.goal_mm();
     state.width = width_;
     state.height = height_;
-    if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !failure_) {
+    if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !control_.failure()) {
       state.tick = rehearsal->latest();
       state.removed_mm3 = rehearsal->removed_mm3();
       rehearsal->look([&](const World& world, SceneReaders&) {
@@ -891,6 +548,7 @@ class RehearsalWindow {
     write_window_state(state, state_file_);
   }
 
+  RehearsalControl control_;
   WindowActions actions_;
   VerdictSummary scan_;
   std::filesystem::path state_file_;
@@ -902,23 +560,12 @@ class RehearsalWindow {
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
-  Vec3 centre_{};
-  double radius_ = 100;
-  HandGoal goal_;
-  Vec3 axis_{0, 0, 1};  // of the handle, on its way to what the view wants
-  std::optional<Leading> leading_;
-  std::optional<Error> failure_;  // nothing runs until something is begun
-  std::optional<Error> lost_;     // and this was lost for good
-  int tool_;
   std::string device_name_;
   int gl_errors_ = 0;
   std::uint64_t pictures_ = 0;
-  bool sucking_ = false, washing_ = false, ran_ = false, wait_for_release_ = false, in_hand_ = true;
-  CameraNotes camera_notes_;
-  bool drill_latched_ = false, drill_held_ = false, show_help_ = false, screenshot_wanted_ = false, quit_ = false;
+  bool show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
-  std::string message_;
-  std::chrono::steady_clock::time_point message_until_{};
+  CameraNotes camera_notes_;
 };
 
 }  // namespace

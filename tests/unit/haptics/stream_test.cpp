@@ -22,7 +22,8 @@ struct Followed {
     std::array<VoxelChange, 8> changes;
     while (r.ticks.pop({&record, 1}) == 1) {
       if (next == StreamReader::kNone) next = r.first_tick.load();
-      wrong += record.tick != next ? 1 : 0;
+      // A hole only where the ring was full and says so.
+      wrong += record.tick < next || (record.tick > next && r.dropped.load() == 0) ? 1 : 0;
       next = record.tick + 1;
       ++ticks;
       wrong += r.changes.pop(std::span(changes).first(record.voxels_changed)) != record.voxels_changed ? 1 : 0;

@@ -54,9 +54,9 @@ std::vector<SceneAction> everything() {
                    {1200, SceneAction::plain(ActionKind::undo)},  // what was drilled since the distractor was opened
                    {1300, SceneAction::saw({{9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.7}, 0)},
                    {1301, SceneAction::split(20)},
-                   {1400, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split
-                   {1400, SceneAction::plain(ActionKind::undo)},  // and that
                    {1401, SceneAction::grip(mini)},
+                   {1450, SceneAction::plain(ActionKind::undo)},  // what was drilled since the split,
+                   {1460, SceneAction::plain(ActionKind::undo)},  // and the split: with a plate in the hand nothing is drilled between
                    {1600, SceneAction::grip(SceneAction::kNobody)}});
 }
 
