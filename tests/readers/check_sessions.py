@@ -40,13 +40,13 @@ while at < len(raw):
     magic, kind, size, crc = struct.unpack_from("<4sIII", raw, at)
     assert magic == b"OSF1"
     if kind == 2:
-        for t in range(at + 16, at + 16 + size, 120):
+        for t in range(at + 16, at + 16 + size, 128):
             tick, x, y, z = struct.unpack_from("<Q3f", raw, t)
             force = struct.unpack_from("<3f", raw, t + 36)
             removed, changed, immersed = struct.unpack_from("<fII", raw, t + 80)
             ticks.append((tick, x, y, z, raw[t + 35], *force, removed, changed, immersed))
     if kind == 5:
-        actions.append(struct.unpack_from("<Q4I12d", raw, at + 16))
+        actions.append(struct.unpack_from("<Q4I", raw, at + 16) + struct.unpack_from("<12d", raw, at + 48))
     at += 16 + size
 truth = np.array(ticks)
 names = ["tick", "x_mm", "y_mm", "z_mm", "buttons", "force_x_n", "force_y_n", "force_z_n", "removed_mm3", "voxels_changed", "immersed"]

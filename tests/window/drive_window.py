@@ -281,7 +281,7 @@ def hand():
     for _, _, began, ended in seen:
         way = rows[began + 100 : ended]
         assert max(map(force, way)) < 1, max(map(force, way))
-        assert not any(int(float(r["drill_on"])) for r in way)
+        assert not any(int(float(r["pedal"])) for r in way)
     print("most force on", len(seen), "ways:", max(max(map(force, rows[b + 100 : e])) for _, _, b, e in seen), "N; first tick", force(first), "N")
 
 

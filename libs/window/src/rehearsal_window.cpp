@@ -38,6 +38,7 @@
 #include "osteo/view/offscreen.h"
 #include "osteo/view/world_view.h"
 #include "scene_tools.h"
+#include "settings_panel.h"
 #include "status_panel.h"
 #include "window_state.h"
 
@@ -814,6 +815,7 @@ class RehearsalWindow {
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
     ImGui::Separator();
     draw_status(rehearsal, tick);  // below the buttons, which its lines would move
+    draw_settings(rehearsal);
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");

@@ -22,7 +22,7 @@ class Backlog;
 /// One thread takes from the stream and makes frames, another waits for the disk; between them frames pile up while the disk stalls: 128
 /// MiB, which is a minute at 1 kHz with 2.2 KB a tick (0.1 to 0.7 KB are usual). When that is full, ticks are left out and counted until
 /// half of it is written again: a RecordingGap. Of such a time only what bone became and what was done is kept, 8 bytes for each voxel that
-/// changed and 120 for each action.
+/// changed and 128 for each action.
 class Recorder {
  public:
   static constexpr std::size_t kMostWaitingBytes = std::size_t{128} << 20;
