@@ -163,7 +163,13 @@ void HandRenderer::touch() noexcept {
   for (HapticScene::Item& item : scene.items) {
     HandContact& mine = *item.hands[number_];
     ContactModel* const model = mine.models[method].get();
-    if (mine.in_use != nullptr && model != mine.in_use) mine.in_use->rest();
+    if (mine.in_use == nullptr) {  // new; its models may have been another's
+      for (const auto& any : mine.models) {
+        if (any) any->rest();
+      }
+    } else if (model != mine.in_use) {
+      mine.in_use->rest();
+    }
     mine.in_use = model;
     const Vec3 at = item.body_from_world(at_);
     // A body alone is always asked: it may be nowhere near, but what its proxy remembers has to follow.

@@ -43,7 +43,6 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     header.program_version = program_version();
     header.bone_hash = operation_.world().hash();
     header.rate_hz = options_.rate_hz;
-    header.hands = static_cast<std::uint32_t>(options_.haptics.hands());
     header.haptics = options_.haptics;
     header.dust = options_.follow.dust;
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);

@@ -28,7 +28,7 @@ std::vector<FieldRef> all_fields(HapticSetup& setup) {
   return fields;
 }
 
-// { "diamond": "proxy", "cutting taper": "volume" }: a burr is meant when its name holds all of the words.
+// { "diamond": "proxy", "cutting taper": "volume", "sucker": "overlap" }: an instrument is meant when its name holds all of the words.
 void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup& setup) {
   if (tools.kind != JsonValue::Kind::object) throw file.wrong(tools, "\"tools\" must be an object in braces");
   for (const auto& [words, method_name] : tools.members) {
@@ -37,20 +37,21 @@ void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup&
     collect({words, "method of contact"}, method);
     file.read(method_name, "tools", collect.fields.front());
     bool any = false;
-    for (std::size_t t = 0; t < burr_library().size(); ++t) {
-      const Burr& b = burr_library()[t];
+    for (std::size_t t = 0; t < instrument_library().size(); ++t) {
+      const Instrument& i = instrument_library()[t];
       // Balls do not say so in their name.
-      const std::string burr = " " + b.name() + (b.shape == BurrShape::ball ? " ball " : " ");
+      const bool ball = i.as_burr() != nullptr && i.as_burr()->shape == BurrShape::ball;
+      const std::string name = " " + i.name + (ball ? " ball " : " ");
       std::istringstream in(words);
       bool all = true;
-      for (std::string word; in >> word;) all = all && burr.find(" " + word + " ") != std::string::npos;
+      for (std::string word; in >> word;) all = all && name.find(" " + word + " ") != std::string::npos;
       if (!all) continue;
       setup.tool_methods[static_cast<int>(t)] = method;
       any = true;
     }
     if (!any)
-      throw file.wrong(method_name, "tools: no burr is a \"" + words + "\"",
-                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm");
+      throw file.wrong(method_name, "tools: no instrument is a \"" + words + "\"",
+                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook");
   }
 }
 

@@ -198,7 +198,7 @@ std::string header_json(const SessionHeader& h) {
   j["program"] = h.program_version;
   j["bone_hash"] = h.bone_hash;
   j["rate_hz"] = h.rate_hz;
-  j["hands"] = h.hands;
+  j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", h.kernels.contact}, {"scene", h.kernels.scene}};
   for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()}) j["records"][std::string(t->name)] = record_json(*t);
@@ -224,14 +224,12 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   }
   h.bone_hash = j.at("bone_hash");
   h.rate_hz = j.at("rate_hz");
-  h.hands = j.value("hands", 1U);
   h.dust = j.value("dust", false);
-  if (!(h.rate_hz > 0) || h.hands < 1 || h.hands > 64) throw Error(ExitCode::corrupt, name + " tells of no rate, or of no hands");
+  if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " tells of no rate");
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};
   if (h.kernels != Kernels{})
     say_not_replayable(o, "burrs, contact or scene of " + h.program_version + " give other bits than this version's");
-  if (h.hands > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.hands) + " hands");
   for (const auto& [kind, record] : j.at("records").items()) tables.push_back(table_of(kind, record, name, o));
   const auto has = [&](std::uint32_t part) {
     return std::any_of(tables.begin(), tables.end(), [&](const FileTable& t) { return t.part == part; });
@@ -251,7 +249,8 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   for (const auto& i : j.at("instruments")) o.tools.push_back(i.at("name"));
   std::vector<std::string> unknown;
   h.haptics = setup_of(j.at("haptics"), unknown);
-  if (h.haptics.hands() != h.hands) throw Error(ExitCode::corrupt, name + " tells of other devices than hands");
+  if (j.at("hands") != h.haptics.hands()) throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
+  if (h.haptics.hands() > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);
   for (const std::string& u : unknown) {
     o.newer.push_back("the setting '" + u + "'");

@@ -176,7 +176,7 @@ void SessionReader::File::take(std::uint64_t at, const FrameHead& head, std::spa
     case kRecordsFrame:
       arrive(head.first_tick);
       next_tick = head.end_tick;
-      outline.tick_records += (head.end_tick - head.first_tick) * outline.header.hands;
+      outline.tick_records += (head.end_tick - head.first_tick) * outline.header.haptics.hands();
       break;
     case kGapFrame: {
       arrive(head.first_tick);
@@ -327,7 +327,7 @@ bool SessionReader::Parts::State::next_of_frame() {
       read(ticks);
       for (const TickRecord& t : ticks) {
         if (t.tick != next_tick || t.hand != hand || t.tick >= entry->end_tick) file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
-        if (++hand == file.outline.header.hands) {
+        if (++hand == file.outline.header.haptics.hands()) {
           hand = 0;
           ++next_tick;
         }

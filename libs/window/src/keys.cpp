@@ -85,7 +85,7 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Ctrl-wheel", "nearer and farther", {}},
                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
                                               {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
-                                              {"V, I", "sucks dust off at the burr; washes it away", {suck, wash}},
+                                              {"V, I", "a sucker, or water, beside the burr", {suck, wash}},
                                               {"X", "saw: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
                                               {"P", "pieces: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
                                               {"L", "plate in the hand, moved like the drill", {plates}},

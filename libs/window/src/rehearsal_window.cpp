@@ -39,6 +39,7 @@
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
 #include "scene_tools.h"
+#include "settings_panel.h"
 #include "status_panel.h"
 #include "window_state.h"
 
@@ -488,6 +489,7 @@ class RehearsalWindow {
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
     ImGui::Separator();
     draw_status(rehearsal, tick);  // below the buttons, which its lines would move
+    draw_settings(rehearsal);
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");

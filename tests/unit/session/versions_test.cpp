@@ -170,7 +170,10 @@ TEST(Versions, WhatTheServoCannotRepeatIsSaid) {
   EXPECT_NE(why(test::with_pulse(FieldRole::input)).find("'pulse_bpm'"), std::string::npos);
   EXPECT_NE(why(test::without("buttons")).find("'buttons'"), std::string::npos);
   EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["kernels"]["contact"] = 1000; }).find("other bits"), std::string::npos);
-  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["hands"] = 3; }).find("3 hands"), std::string::npos);
+  EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) {
+              j["hands"] = 5;
+              while (j["haptics"]["devices"].size() < 5) j["haptics"]["devices"].push_back(j["haptics"]["devices"][0]);
+            }).find("5 hands"), std::string::npos);
   EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["magic"] = "2"; }).find("'magic'"), std::string::npos);
   EXPECT_NE(why(test::tick_fields(), [](ordered_json& j) { j["haptics"]["params"]["method"] = "magic"; }).find("magic"), std::string::npos);
   fs::remove(path);
@@ -181,9 +184,12 @@ TEST(Versions, HandsShareTheNumberOfTheirTick) {
   const auto path = fresh("hands.oss");
   const auto write = [&](bool whole) {
     SessionHeader h = header("hands");
-    h.hands = 2;
+    h.haptics.more_devices.resize(1);
     std::vector<TickRecord> ticks;
-    for (const TickRecord& t : some_ticks(0, 5)) ticks.insert(ticks.end(), 2, t);
+    for (const TickRecord& t : some_ticks(0, 5)) {
+      ticks.insert(ticks.end(), 2, t);
+      ticks.back().hand = 1;
+    }
     if (!whole) ticks.erase(ticks.begin() + 3);
     test::OtherWriter w(path, h, test::tick_fields());
     w.ticks(ticks);
@@ -214,7 +220,7 @@ TEST(Versions, OtherFormatsAreRefusedWithAdvice) {
   EXPECT_NE(refusal(path).find("'i128'"), std::string::npos) << refusal(path);
   { test::OtherWriter w(path, header("odd"), test::without("tick")); }
   EXPECT_NE(refusal(path).find("lacks 'tick'"), std::string::npos) << refusal(path);
-  for (const char* const key : {"records", "haptics", "kernels", "burrs", "actions"}) {
+  for (const char* const key : {"records", "haptics", "kernels", "instruments", "actions"}) {
     {
       test::OtherWriter w(path, header("odd"), test::tick_fields(), [&](ordered_json& j) { j.erase(key); });
     }

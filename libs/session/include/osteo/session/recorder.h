@@ -22,7 +22,7 @@ class Backlog;
 /// One thread takes from the stream and makes frames, each of a tenth of a second; another waits for the disk. Between them frames pile up
 /// while the disk stalls: 32 MiB, which is a minute at 1 kHz with 0.5 KB a tick (0.05 to 0.1 KB are usual). When that is full, ticks are
 /// left out and counted until half of it is written again: a RecordingGap. Of such a time only what bone became and what was done is kept,
-/// 8 bytes for each voxel that changed and 120 for each action.
+/// 8 bytes for each voxel that changed and 128 for each action.
 class Recorder {
  public:
   static constexpr std::size_t kMostWaitingBytes = std::size_t{32} << 20;

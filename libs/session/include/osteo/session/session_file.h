@@ -26,9 +26,8 @@ struct SessionHeader {
   std::string program_version;
   std::string bone_hash;  ///< World::hash() before the first tick
   double rate_hz = 1000;
-  std::uint32_t hands = 1;  ///< records of a tick, in the order of hands
   Kernels kernels;
-  HapticSetup haptics;
+  HapticSetup haptics;  ///< of how many hands, too: each tick has a record for each, in their order
   bool dust = false;  ///< the scene has bone dust
 };
 

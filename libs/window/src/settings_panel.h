@@ -1,0 +1,10 @@
+// How it feels, to be changed while it runs. Private to libs/window.
+#pragma once
+#include "osteo/scene/rehearsal.h"
+
+namespace osteo {
+
+/// Into the current ImGui window: a header that opens, and under it all haptic settings, each an action of the session when it is changed.
+void draw_settings(Rehearsal& rehearsal);
+
+}  // namespace osteo
