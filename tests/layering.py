@@ -6,6 +6,10 @@ root = pathlib.Path(sys.argv[1])
 heavy = re.compile(r'#include [<"](openvdb/|CGAL/|ceres/|CLI/|opencv2/|tetgen|nlohmann/json\.hpp|Eigen/|vtk)')
 for_sources_only = {"libs/pipeline/include/osteo/pipeline/report_json.h", "libs/grid/include/osteo/grid/vdb.h"}  # both say so themselves
 shows_vtk = {"vtk", "view", "io"}  # VTK is what these are about
+# JSON is read by JsonFile and written by Json; the library behind them is slow to compile. These are still to follow.
+json_inside = {"libs/base/src/json.cpp", "libs/base/src/json_document.cpp"}
+json_still = {"libs/scene/src/plan.cpp", "libs/scene/src/session_folder.cpp", "libs/session/src/export.cpp", "libs/session/src/script_file.cpp",
+              "libs/session/src/session_file.cpp", "libs/window/src/window_state.cpp"}
 bad = []
 
 # The table: library -> (may be included by its headers, by its sources only).
@@ -42,6 +46,8 @@ for lib in sorted(p.name for p in (root / "libs").iterdir() if p.is_dir() and p.
             h = heavy.match(line)
             if public and h and name not in for_sources_only and not (h[1] == "vtk" and lib in shows_vtk):
                 bad.append(f"{name}: {line}")
+            if "nlohmann" in line and name not in json_inside | json_still:
+                bad.append(f"{name}: {line}: JsonFile reads JSON, Json writes it (libs/base)")
             if re.match(r'#include ".*\.\./', line) or re.match(r'#include "osteo/[^"]*/src/', line):
                 bad.append(f"{name}: {line}: only public headers of other libraries")
     public, private = table[lib]
@@ -55,6 +61,9 @@ for lib in sorted(p.name for p in (root / "libs").iterdir() if p.is_dir() and p.
         bad.append(f"libs/layers.txt: no public header of {lib} includes {other}")
     for other in sorted(private - in_sources.keys()):
         bad.append(f"libs/layers.txt: no source of {lib} includes {other}")
+for name in sorted(json_still):
+    if not (root / name).exists() or "nlohmann" not in (root / name).read_text():
+        bad.append(f"tests/layering.py: {name} needs no exception any more")
 for lib in table:
     if not (root / "libs" / lib).is_dir():
         bad.append(f"libs/layers.txt: there is no libs/{lib}")

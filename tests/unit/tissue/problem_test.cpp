@@ -68,14 +68,14 @@ TEST(TissueProblem, ValuesOutOfRangeAreRefusedWithTheirLine) {
   says("100, \"poisson\"", "100, \"density\": 1, \"poisson\"", "line 2: material: the key \"density\" is not known");
   says("[0.1, 11, 11]", "[-0.1, -11, 11]", "line 3: fixed 1: \"box_mm\" must be its lower corner, then its upper");
   says("[0.1, 11, 11]", "[0.1, 11]", "line 3: fixed 1: \"box_mm\" must have 3 items");
-  says("[0.1, 11, 11]", "[0.1, 11, 1e9]", "line 3: fixed 1: \"box_mm\" is 1000000000");
+  says("[0.1, 11, 11]", "[0.1, 11, 1e9]", "line 3: fixed 1: \"box_mm\" is 1e+09");
   says("[0.1, 11, 11]]", "[0.1, 11, 11]], \"axes\": \"xw\"", "line 3: fixed 1: \"axes\" are made of x, y and z");
   says("[0.1, 11, 11]]", "[0.1, 11, 11]], \"at_mm\": [0, 0, 0]", "line 3: fixed 1: it needs a place");
   says("\"radius_mm\": 6", "\"radius_mm\": 0", "line 5: load 1, force 1: \"radius_mm\" is 0");
   says("\"radius_mm\": 6, ", "", "line 5: load 1, force 1: it needs a place");
   says("[0, 0, 2]", "[0, 0, 2e9]", "line 5: load 1, force 1: \"total_n\"");
   says("\"kpa\": 2", "\"kpa\": true", "line 6: load 1, surface 1: \"kpa\" must be a number");
-  says("\"kpa\": 2", "\"kpa\": -2e6", "line 6: load 1, surface 1: \"kpa\" is -2000000");
+  says("\"kpa\": 2", "\"kpa\": -2e6", "line 6: load 1, surface 1: \"kpa\" is -2e+06");
   says("\"fixed\"", "\"fixde\"", "line 3: the key \"fixde\" is not known: did you mean \"fixed\"?");
   says("\"osteotome_tissue\": 1", "\"osteotome_tissue\": 2", "line 1: \"osteotome_tissue\" must be 1");
 }
