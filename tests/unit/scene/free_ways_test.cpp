@@ -12,6 +12,7 @@
 #include "osteo/grid/resample.h"
 #include "osteo/haptics/renderer.h"
 #include "osteo/image/phantom.h"
+#include "osteo/image/structures.h"
 #include "osteo/image/threshold.h"
 #include "osteo/scene/free_ways.h"
 
@@ -128,8 +129,8 @@ class Hand {
 };
 
 // From each view to what one sees there, beginning where the view before ended.
-void from_six_views(const char* name, const World& world) {
-  const FreeWays ways(world, skin_of_burr(kTool));
+void from_six_views(const char* name, const World& world, const StructureMap* structures = nullptr) {
+  const FreeWays ways(world, skin_of_burr(kTool), structures);
   const HandPose start = ways.waiting(normalized(kViews[0].eye), kViews[0].axis());
   Hand hand(world, start);
   hand.tick();
@@ -186,6 +187,19 @@ TEST(FreeWays, FromSixViewsOnThePhantomsTemporalBone) {
   p.region = PhantomRegion::temporal;
   p.spacing_mm = 0.8;
   from_six_views("phantom temporal bone", world_of(make_phantom(p).ct, 500, 0.8));
+}
+
+// Structures cost little where they are, and change nothing where they are covered by bone.
+TEST(FreeWays, FromSixViewsWithStructuresAtRisk) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 0.8;
+  const Phantom phantom = make_phantom(p);
+  StructuresParams named;
+  named.names = "6=facial nerve, 7=sigmoid sinus";
+  named.only_named = true;
+  const StructureMap structures(name_structures(phantom.labels, named));
+  from_six_views("phantom temporal bone with structures", world_of(phantom.ct, 500, 0.8), &structures);
 }
 
 TEST(FreeWays, FromSixViewsOnAHead) {
