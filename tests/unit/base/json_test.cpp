@@ -217,7 +217,9 @@ TEST(JsonDocument, NumbersAndTextsAreWrittenAsTheLibraryWritesThem) {
     if (n % 2 == 0) d = std::ldexp(static_cast<double>(bits >> 20), -static_cast<int>(n % 60));
     if (n % 5 == 0) d = std::round(d * 1e3) / 1e3;
     ASSERT_EQ(Json(d).dump(), ordered_json(d).dump());
-    if (std::isfinite(d)) ASSERT_EQ(Json::parse(Json(d).dump())->number(), d);
+    if (std::isfinite(d)) {
+      ASSERT_EQ(Json::parse(Json(d).dump())->number(), d);
+    }
   }
   for (const double d : {0.0, -0.0, 1.0, 1e15, 1e16, 1e-5, 123456789.0, 5e-324, std::nan(""), HUGE_VAL})
     EXPECT_EQ(Json(d).dump(), ordered_json(d).dump());
