@@ -26,9 +26,9 @@
 
 #include "bench.h"
 #include "osteo/base/files.h"
+#include "osteo/bone_import/import_bone.h"
 #include "osteo/dicom/save_series.h"
 #include "osteo/dicom/volume.h"
-#include "osteo/grid/import_bone.h"
 #include "osteo/image/phantom.h"
 
 namespace osteo {

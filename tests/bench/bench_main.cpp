@@ -1,38 +1,55 @@
 // osteo_bench [SUBJECT] [THREADS]
+#include "bench.h"
+#include "bench_subjects.h"
+
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
-#include "bench.h"
+namespace osteo {
+namespace {
 
-int main(int argc, char** argv) {
-  const std::string subject = argc > 1 ? argv[1] : "all";
-  osteo::Context context;
-  context.threads = argc > 2 ? std::atoi(argv[2]) : 0;
-  // Import first: it measures in processes of its own, which must start before any thread does.
-  if (subject == "import" || subject == "all") osteo::bench_import(context);
-  if (subject == "bone" || subject == "all") osteo::bench_bone(context);
-  if (subject == "haptics" || subject == "all") osteo::bench_haptics(context);
-  if (subject == "operation" || subject == "all") osteo::bench_operation(context);
-  if (subject == "tissue" || subject == "all") osteo::bench_tissue(context);
-  if (subject == "haptics-hands") osteo::bench_haptics_hands(context);
-  if (subject == "haptics-fuzz") osteo::bench_haptics_fuzz(context);
-  if (subject == "removal" || subject == "all") osteo::bench_removal(context);
+using Run = void (*)(const Context&);
+
 #ifdef OSTEO_BENCH_GEOMETRY
-  if (subject == "geometry" || subject == "all") osteo::bench_geometry(context);
+constexpr Run kGeometry = bench_geometry;
 #else
-  if (subject == "geometry") {
-    std::fprintf(stderr, "osteo_bench: geometry needs a build with CGAL and TetGen, and the packages libembree-dev and libnanoflann-dev\n");
+constexpr Run kGeometry = nullptr;  // needs CGAL, TetGen, Embree and nanoflann
+#endif
+
+constexpr std::array<Run, kBenchSubjects.size()> kRuns{
+    bench_import, bench_bone, bench_haptics, bench_operation, bench_tissue, bench_haptics_fuzz, bench_haptics_hands, bench_removal, kGeometry};
+// The order of the table.
+static_assert(kBenchSubjects[0].name == "import" && kBenchSubjects[1].name == "bone" && kBenchSubjects[2].name == "haptics" &&
+              kBenchSubjects[3].name == "operation" && kBenchSubjects[4].name == "tissue" && kBenchSubjects[5].name == "haptics-fuzz" &&
+              kBenchSubjects[6].name == "haptics-hands" && kBenchSubjects[7].name == "removal" && kBenchSubjects[8].name == "geometry");
+
+int run(const std::string& wanted, const Context& context) {
+  bool known = wanted == "all";
+  for (const BenchSubject& s : kBenchSubjects) known = known || s.name == wanted;
+  if (!known) {
+    std::fprintf(stderr, "osteo_bench: there is no subject '%s'; %s\n", wanted.c_str(), bench_subject_names().c_str());
     return 2;
   }
-#endif
-  if (subject != "all" && subject != "import" && subject != "bone" && subject != "geometry" && subject != "haptics" &&
-      subject != "operation" && subject != "tissue" && subject != "haptics-fuzz" && subject != "haptics-hands" && subject != "removal") {
-    std::fprintf(stderr,
-                 "osteo_bench: there is no subject '%s'; all, bone, geometry, haptics, haptics-fuzz, haptics-hands, import, operation, "
-                 "removal, tissue\n",
-                 subject.c_str());
-    return 2;
+  for (std::size_t i = 0; i < kBenchSubjects.size(); ++i) {
+    const BenchSubject& s = kBenchSubjects[i];
+    if (wanted != s.name && !(wanted == "all" && s.in_all)) continue;
+    if (kRuns[i] != nullptr) {
+      kRuns[i](context);
+    } else if (wanted == s.name) {
+      std::fprintf(stderr, "osteo_bench: %s needs a build with CGAL and TetGen, and the packages libembree-dev and libnanoflann-dev\n",
+                   wanted.c_str());
+      return 2;
+    }
   }
   return 0;
+}
+
+}  // namespace
+}  // namespace osteo
+
+int main(int argc, char** argv) {
+  osteo::Context context;
+  context.threads = argc > 2 ? std::atoi(argv[2]) : 0;
+  return osteo::run(argc > 1 ? argv[1] : "all", context);
 }

@@ -20,8 +20,8 @@ LIBRARIES = {
     "scene": (["libs/scene/src/*.cpp"], ["test_scene"]),
     "dicom": (["libs/dicom/src/plac*.cpp"], ["test_dicom"]),
 }
-# Texts only for people, declarations of stages (their tests are commands), and loops for one kind of processor.
-SKIPPED = re.compile(r"/(stages|curve_stage|overlap_avx\w*|default_script)\.cpp$")
+# Texts only for people, and loops for one kind of processor.
+SKIPPED = re.compile(r"/(overlap_avx\w*|default_script)\.cpp$")
 # What is written, what is written instead. Each acts on one match in a line.
 OPERATORS = [
     (r"(?<= )<(?= )", ["<=", ">"]), (r"(?<= )<=(?= )", ["<", ">"]), (r"(?<= )>(?= )", [">=", "<"]), (r"(?<= )>=(?= )", [">", "<"]),

@@ -158,6 +158,12 @@ class Sitting {
     const RehearsalSummary s = over->stop();
     write_summary(session_, s, options_.rate_hz, "window", options_.anatomy);
     for (const std::string& w : s.warnings) io_.context.warn(w);
+    // Told even when quiet: the exit code is about it.
+    if (!s.gaps.empty()) {
+      lost_ticks_ = true;
+      io_.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
+              << " gaps, since the disk did not keep up; session: " << session_.folder.string() << std::endl;
+    }
     if (!io_.common.quiet)
       io_.err << "session: " << session_.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)" << std::endl;
   }
@@ -165,6 +171,8 @@ class Sitting {
   [[nodiscard]] Rehearsal* rehearsal() const { return rehearsal_.get(); }
   [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
   [[nodiscard]] std::string device() const { return hands_.name(); }
+  /// Of any session so far, ticks were not recorded.
+  [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
 
  private:
   const Case& case_;
@@ -174,7 +182,7 @@ class Sitting {
   RehearsalOptions options_;
   SessionFolder session_;
   std::unique_ptr<Rehearsal> rehearsal_;
-  bool has_anatomy_ = false;
+  bool has_anatomy_ = false, lost_ticks_ = false;
 };
 
 void close_at_exit() {
@@ -198,7 +206,7 @@ struct WindowCommand {
   static cli::CommandInfo info() {
     return {"rehearse",
             "drill the bone of a case in a window",
-            "What 'osteo rehearse CASE' opens.",
+            "What 'osteo rehearse CASE' opens. Exit code 8 when ticks were not recorded, since the disk did not keep up.",
             {{"case", "a folder made by prepare"}},
             "osteo-rehearse CASE"};
   }
@@ -241,7 +249,7 @@ struct WindowCommand {
     if (gl_errors > 0)
       throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen; the session is saved",
                   "please report this with the name of the graphics card");
-    return 0;
+    return static_cast<int>(sitting.lost_ticks() ? ExitCode::partial : ExitCode::ok);
   }
 };
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <ostream>
 
+#include "bench_subjects.h"
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -60,7 +61,7 @@ cli::CommandInfo BenchCommand::info() {
   return {"bench",
           "speed against error, beside the peers, in one run",
           "Prints the tables of docs/accuracy.md. Runs osteo_bench, which is built by 'cmake --build build/release --target osteo_bench'.",
-          {{"subject", "all, bone, geometry or import", true}},
+          {{"subject", bench_subject_names(), true}},
           "osteo bench import"};
 }
 

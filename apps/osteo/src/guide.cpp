@@ -1,10 +1,10 @@
 // guide: which threshold suits the bone of a scan.
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "commands.h"
 #include "osteo/base/error.h"
+#include "osteo/base/json_document.h"
 #include "osteo/dicom/import.h"
 #include "osteo/image/bone_threshold.h"
 
@@ -24,11 +24,11 @@ int GuideCommand::run(const Params&, cli::Invocation& io) {
   const BoneGuide g = guide_threshold(ct, io.context.threads);
   io.end_progress();
   if (io.common.json) {
-    nlohmann::ordered_json j{{"soft_tissue_hu", g.soft_tissue_hu},
-                             {"noise_hu", g.noise_hu},
-                             {"dense_bone_hu", g.dense_bone_hu},
-                             {"confidence", g.confidence},
-                             {"presets", nlohmann::ordered_json::object()}};
+    Json j{{"soft_tissue_hu", g.soft_tissue_hu},
+           {"noise_hu", g.noise_hu},
+           {"dense_bone_hu", g.dense_bone_hu},
+           {"confidence", g.confidence},
+           {"presets", Json::object()}};
     for (const PresetGuide& p : g.presets) {
       j["presets"][std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(p.preset)])] = {
           {"lower_hu", p.lower_hu}, {"volume_mm3", p.volume_mm3}, {"change_percent_per_50_hu", p.change_percent}};

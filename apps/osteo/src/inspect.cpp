@@ -1,12 +1,12 @@
 // list, info, series: what there is.
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/dicom/scan.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/pipeline/formats.h"
@@ -15,13 +15,11 @@
 namespace osteo {
 namespace {
 
-using nlohmann::ordered_json;
-
-ordered_json triple(Vec3 v) {
+Json triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
-void add_frame(ordered_json& j, const Frame& f) {
+void add_frame(Json& j, const Frame& f) {
   j["dims"] = f.dims;
   j["spacing_mm"] = triple(f.spacing_mm);
   j["origin_mm"] = triple(f.origin_mm);
@@ -29,8 +27,7 @@ void add_frame(ordered_json& j, const Frame& f) {
   j["direction"] = {triple(f.direction.column[0]), triple(f.direction.column[1]), triple(f.direction.column[2])};
 }
 
-ordered_json describe_data(const Data& data) {
-  ordered_json j;
+void describe_data(Json& j, const Data& data) {
   j["kind"] = kind_name(kind_of(data));
   if (const auto* image = std::get_if<Image>(&data)) {
     add_frame(j, image->frame);
@@ -83,17 +80,16 @@ ordered_json describe_data(const Data& data) {
     j["width"] = picture->width;
     j["height"] = picture->height;
   }
-  return j;
 }
 
 // JSON as indented lines for people.
-void print_plain(std::ostream& out, const ordered_json& j, const std::string& indent = "") {
-  for (const auto& [key, value] : j.items()) {
-    if (value.is_object()) {
+void print_plain(std::ostream& out, const Json& j, const std::string& indent = "") {
+  for (const auto& [key, value] : j.members()) {
+    if (!value.members().empty()) {
       out << indent << key << ":\n";
       print_plain(out, value, indent + "  ");
     } else {
-      out << indent << key << ": " << (value.is_string() ? value.get<std::string>() : value.dump()) << '\n';
+      out << indent << key << ": " << (value.text() != nullptr ? *value.text() : value.dump()) << '\n';
     }
   }
 }
@@ -106,7 +102,7 @@ cli::CommandInfo ListCommand::info() {
 }
 
 int ListCommand::run(const Params&, cli::Invocation& io) {
-  ordered_json all = ordered_json::array();
+  Json all = Json::list();
   for (const auto& name : io.registry.names()) {
     const auto stage = io.registry.make(name);
     std::string in, out;
@@ -137,16 +133,16 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
   const fs::path path = io.arguments[0];
   require_readable(path);
   if (fs::is_directory(path) && !fs::exists(path / "manifest.json")) return SeriesCommand::run({}, io);
-  ordered_json j;
+  Json j;
   if (fs::is_directory(path)) {
-    j = ordered_json::parse(read_text(path / "manifest.json"), nullptr, false);
-    if (j.is_discarded())
-      throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
+    const auto manifest = Json::parse(read_text(path / "manifest.json"));
+    if (!manifest) throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
+    j = *manifest;
   } else {
     static constexpr std::array kAny{DataKind::image,   DataKind::labels, DataKind::grid,
                                      DataKind::surface, DataKind::tets,   DataKind::picture};
     j["file"] = path.string();
-    j.update(describe_data(load_data(path, kAny, io.context)));
+    describe_data(j, load_data(path, kAny, io.context));
   }
   io.end_progress();
   if (io.common.json) {
@@ -170,31 +166,31 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
   const DicomScan scan = scan_dicom(io.arguments[0], {}, io.context);
   io.end_progress();
   if (io.common.json) {
-    ordered_json j;
+    Json j;
     j["files"] = scan.files;
-    j["series"] = ordered_json::array();
+    j["series"] = Json::list();
     for (const DicomSeries& s : scan.series) {
-      ordered_json e{{"number", s.number},
-                     {"uid", s.uid},
-                     {"modality", s.modality},
-                     {"what", s.what},
-                     {"usable", s.usable},
-                     {"recommended", s.recommended},
-                     {"images", s.images},
-                     {"columns", s.columns},
-                     {"rows", s.rows},
-                     {"pixel_mm", s.pixel_mm},
-                     {"thickness_mm", s.thickness_mm},
-                     {"gap_mm", s.gap_mm},
-                     {"kernel", s.kernel},
-                     {"description", s.description}};
+      Json e{{"number", s.number},
+             {"uid", s.uid},
+             {"modality", s.modality},
+             {"what", s.what},
+             {"usable", s.usable},
+             {"recommended", s.recommended},
+             {"images", s.images},
+             {"columns", s.columns},
+             {"rows", s.rows},
+             {"pixel_mm", s.pixel_mm},
+             {"thickness_mm", s.thickness_mm},
+             {"gap_mm", s.gap_mm},
+             {"kernel", s.kernel},
+             {"description", s.description}};
       if (s.usable) e["why"] = s.why;
       if (!s.problem.empty()) e["problem"] = s.problem;
       j["series"].push_back(std::move(e));
     }
-    j["set_aside"] = ordered_json::array();
+    j["set_aside"] = Json::list();
     for (const FileSetAside& f : scan.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
-    io.out << j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+    io.out << j.dump(2) << '\n';
     return 0;
   }
   io.out << "  series  images  size       pixel mm  gap mm    what                          kernel    description\n";

@@ -8,13 +8,13 @@
 #include <cmath>
 #include <fstream>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <ostream>
 #include <thread>
 
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/base/simd.h"
 #include "osteo/devices/devices.h"
 #include "osteo/rt/loop.h"
@@ -22,8 +22,6 @@
 
 namespace osteo {
 namespace {
-
-using nlohmann::ordered_json;
 
 std::string hex4(unsigned v) {
   char text[8];
@@ -66,7 +64,7 @@ class Watcher {
   SpaceMouseState mouse_;
 };
 
-ordered_json quantiles(const Histogram& h) {
+Json quantiles(const Histogram& h) {
   const auto us = [](double v) { return std::round(v * 10) / 10; };
   return {{"p50_us", us(h.quantile_us(0.5))},
           {"p99_us", us(h.quantile_us(0.99))},
@@ -95,7 +93,7 @@ cli::CommandInfo DevicesCommand::info() {
 }
 
 int DevicesCommand::run(const Params& p, cli::Invocation& io) {
-  ordered_json j = ordered_json::array();
+  Json j = Json::list();
   if (!p.recording.empty()) {
     const HidRecording recording = load_hid_recording(p.recording);
     const DeviceModel model = model_of(recording.info.vendor, recording.info.product);
@@ -165,14 +163,15 @@ cli::CommandInfo DoctorCommand::info() {
 }
 
 int DoctorCommand::run(const Params& p, cli::Invocation& io) {
-  ordered_json j;
+  Json j;
   std::vector<std::string> advice;
   utsname u{};
   ::uname(&u);
   j["processor"] = processor();
   j["cores"] = std::thread::hardware_concurrency();
   j["kernel"] = std::string(u.sysname) + " " + u.release;
-  j["kernel_is_realtime"] = fs::exists("/sys/kernel/realtime");
+  const bool realtime_kernel = fs::exists("/sys/kernel/realtime");
+  j["kernel_is_realtime"] = realtime_kernel;
   j["vector_instructions"] = simd_name(simd());
 
   io.context.progress(0.1, "measuring the loop");
@@ -205,35 +204,37 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
                {"missed_by_machine", s.missed_by_machine}};
   if (s.lateness.quantile_us(0.99) > 350)
     advice.push_back("a hundredth of the ticks is later than 0.35 ms: close other programs, or take a machine that is not shared");
-  if (s.missed_by_machine > 0 && j["kernel_is_realtime"] == false)
+  if (s.missed_by_machine > 0 && !realtime_kernel)
     advice.push_back("ticks were lost to the machine: on a machine of your own, the package linux-image-rt-amd64 helps");
 
-  j["devices"] = ordered_json::array();
+  j["devices"] = Json::list();
   for (const FoundDevice& f : find_devices()) {
     j["devices"].push_back(std::string(name_of(f.model)) + " " + f.info.path + (f.readable ? "" : " (" + f.why + ")"));
     if (!f.readable)
       advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" + hex4(f.info.vendor) +
                        "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
   }
+  std::string opengl;
   try {
     OffscreenWindow window(64, 64);
     static_cast<void>(window.render());
-    j["opengl"] = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
-    const std::string all = j["opengl"];
+    const std::string all = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
     const auto line = [&](const std::string& key) {
       const auto at = all.find(key);
       return at == std::string::npos ? std::string() : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
     };
-    j["opengl"] = line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
-    if (j["opengl"].get<std::string>().find("llvmpipe") != std::string::npos)
+    opengl = line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
+    if (opengl.find("llvmpipe") != std::string::npos)
       advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
   } catch (const Error& e) {
-    j["opengl"] = "none";
+    opengl = "none";
     advice.push_back("there is no OpenGL: install libegl1 and libgl1-mesa-dri");
   }
-  j["display"] = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
-  j["audio"] = fs::exists("/dev/snd");
-  if (!fs::exists("/dev/snd")) advice.push_back("there is no sound device");
+  j["opengl"] = opengl;
+  const bool display = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr, audio = fs::exists("/dev/snd");
+  j["display"] = display;
+  j["audio"] = audio;
+  if (!audio) advice.push_back("there is no sound device");
   j["advice"] = advice;
   io.end_progress();
   if (io.common.json) {
@@ -241,9 +242,9 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
     return 0;
   }
   const auto yes = [](bool v) { return v ? "yes" : "NO"; };
-  const auto& late = j["loop"]["lateness"];
-  io.out << j["processor"].get<std::string>() << ", " << j["cores"] << " cores, " << j["kernel"].get<std::string>()
-         << (j["kernel_is_realtime"].get<bool>() ? " (real-time)" : "") << ", vectors: " << simd_name(simd()) << '\n'
+  Json& late = j["loop"]["lateness"];
+  io.out << processor() << ", " << j["cores"] << " cores, " << u.sysname << " " << u.release << (realtime_kernel ? " (real-time)" : "")
+         << ", vectors: " << simd_name(simd()) << '\n'
          << "real-time priority  " << yes(s.realtime_granted) << (s.realtime_refusal.empty() ? "" : "  (" + s.realtime_refusal + ")")
          << '\n'
          << "memory locked       " << yes(s.memory_locked) << '\n'
@@ -252,10 +253,10 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
          << ", p99.9 " << late["p99_9_us"] << ", max " << late["max_us"] << " us over " << s.ticks << " ticks; periods missed by work "
          << s.missed_by_work << ", by the machine " << s.missed_by_machine << '\n'
          << "devices             " << (j["devices"].empty() ? "none" : "") << '\n';
-  for (const auto& d : j["devices"]) io.out << "  " << d.get<std::string>() << '\n';
-  io.out << "OpenGL              " << j["opengl"].get<std::string>() << '\n'
-         << "display             " << yes(j["display"]) << '\n'
-         << "sound               " << yes(j["audio"]) << '\n';
+  for (const Json& d : j["devices"].items()) io.out << "  " << *d.text() << '\n';
+  io.out << "OpenGL              " << opengl << '\n'
+         << "display             " << yes(display) << '\n'
+         << "sound               " << yes(audio) << '\n';
   for (const auto& a : advice) io.out << "- " << a << '\n';
   if (advice.empty()) io.out << "nothing to change\n";
   return 0;

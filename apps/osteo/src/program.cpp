@@ -1,7 +1,7 @@
 #include "commands.h"
-#include "osteo/meshing/stages.h"
+#include "osteo/stages/mesh.h"
+#include "osteo/stages/registry.h"
 #include "osteo/tissue/calibrate.h"
-#include "stages.h"
 
 namespace osteo {
 

@@ -1,10 +1,10 @@
 // run and docs.
-#include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/cli/report.h"
 #include "osteo/pipeline/pipeline.h"
 #include "osteo/session/script_file.h"
@@ -32,12 +32,12 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
       }
       Pipeline pipeline = parse_pipeline(text, settings);
       validate(pipeline, io.registry);
-      nlohmann::ordered_json answer{{"valid", true}, {"stages", nlohmann::ordered_json::array()}};
+      Json answer{{"valid", true}, {"stages", Json::list()}};
       for (const auto& n : pipeline.nodes) answer["stages"].push_back({{"id", n.id}, {"stage", n.stage}});
       io.out << answer.dump(2) << '\n';
       return 0;
     } catch (const Error& e) {
-      io.out << nlohmann::ordered_json{{"valid", false}, {"error", e.what()}, {"advice", e.advice()}}.dump(2) << '\n';
+      io.out << Json{{"valid", false}, {"error", e.what()}, {"advice", e.advice()}}.dump(2) << '\n';
       return static_cast<int>(e.code());
     }
   }

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "osteo/base/json_document.h"
+
 namespace osteo {
 namespace {
 
@@ -55,9 +57,9 @@ class Builder : public nlohmann::json_sax<ordered_json> {
     value.flag = v;
     return put(std::move(value));
   }
-  bool number_integer(number_integer_t v) override { return number(static_cast<double>(v)); }
-  bool number_unsigned(number_unsigned_t v) override { return number(static_cast<double>(v)); }
-  bool number_float(number_float_t v, const string_t&) override { return number(v); }
+  bool number_integer(number_integer_t v) override { return number(static_cast<double>(v), true); }
+  bool number_unsigned(number_unsigned_t v) override { return number(static_cast<double>(v), true); }
+  bool number_float(number_float_t v, const string_t&) override { return number(v, false); }
   bool string(string_t& v) override {
     JsonValue value;
     value.kind = JsonValue::Kind::text;
@@ -84,10 +86,11 @@ class Builder : public nlohmann::json_sax<ordered_json> {
 
  private:
   static constexpr std::size_t kDeepest = 64;
-  bool number(double v) {
+  bool number(double v, bool whole) {
     JsonValue value;
     value.kind = JsonValue::Kind::number;
     value.number = v;
+    value.whole = whole;
     return put(std::move(value));
   }
   JsonValue* add(JsonValue value) {
@@ -156,7 +159,7 @@ const JsonValue* JsonValue::find(std::string_view key) const {
   return it == members.end() ? nullptr : &it->value;
 }
 
-JsonFile::JsonFile(std::string_view text, std::string name) : name_(std::move(name)) {
+JsonFile::JsonFile(std::string_view text, std::string name, ExitCode code) : name_(std::move(name)), code_(code) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   Lines lines;
   Builder builder(lines, root_);
@@ -169,7 +172,7 @@ JsonFile::JsonFile(std::string_view text, std::string name) : name_(std::move(na
 }
 
 Error JsonFile::wrong(const JsonValue& at, const std::string& what, const std::string& advice) const {
-  return {ExitCode::usage, "'" + name_ + "' line " + std::to_string(at.line) + ": " + what, advice};
+  return {code_, "'" + name_ + "' line " + std::to_string(at.line) + ": " + what, advice};
 }
 
 void JsonFile::allow(const JsonValue& object, const std::string& where, std::span<const std::string> known) const {
@@ -230,6 +233,42 @@ void JsonFile::read(const JsonValue& value, const std::string& where, const Fiel
   }
 }
 
+const JsonValue& JsonFile::need(const JsonValue& object, const std::string& where, std::string_view key) const {
+  const std::string at = where.empty() ? "" : where + ": ";
+  if (object.kind != JsonValue::Kind::object) throw wrong(object, at + "this must be an object in braces");
+  const JsonValue* const value = object.find(key);
+  if (value == nullptr) throw wrong(object, at + "\"" + std::string(key) + "\" is missing");
+  return *value;
+}
+
+double JsonFile::number(const JsonValue& value, const std::string& called, double lo, double hi) const {
+  if (value.kind != JsonValue::Kind::number) throw wrong(value, called + " must be a number");
+  if (value.number >= lo && value.number <= hi) return value.number;
+  const std::string from = lo > -std::numeric_limits<double>::max() ? format_number(lo) : "", to = hi < 1e300 ? format_number(hi) : "";
+  throw wrong(value, called + " is " + format_number(value.number) + " and must be " +
+                         (from.empty() ? "at most " + to
+                          : to.empty() ? "at least " + from
+                                       : "from " + from + " to " + to));
+}
+
+const std::string& JsonFile::text(const JsonValue& value, const std::string& called) const {
+  if (value.kind != JsonValue::Kind::text) throw wrong(value, called + " must be a text in quotes");
+  return value.text;
+}
+
+const std::vector<JsonValue>& JsonFile::list(const JsonValue& value, const std::string& called, std::size_t count) const {
+  if (value.kind != JsonValue::Kind::list) throw wrong(value, called + " must be a list in brackets");
+  if (count > 0 && value.items.size() != count) throw wrong(value, called + " must have " + std::to_string(count) + " items");
+  return value.items;
+}
+
+void JsonFile::require_format(std::string_view format) const {
+  const JsonValue* const version = root_.kind == JsonValue::Kind::object ? root_.find(format) : nullptr;
+  if (version == nullptr) throw wrong(root_, "\"" + std::string(format) + "\": 1 is missing", "it says which format the file has");
+  if (version->kind != JsonValue::Kind::number || version->number != 1)
+    throw wrong(*version, "\"" + std::string(format) + "\" must be 1", "a file of another version wants another program");
+}
+
 std::string json_complaint(const std::exception& e) {
   std::string_view text = e.what();
   if (text.starts_with('[')) {
@@ -244,11 +283,11 @@ std::string json_complaint(const std::exception& e) {
   return std::string(text);
 }
 
-std::string field_schema(const FieldRef& f) {
-  ordered_json s;
+Json field_schema(const FieldRef& f) {
+  Json s;
   const std::string_view kind = f.kind();
   const std::string text = f.to_text();
-  const auto range = [&](ordered_json& of) {
+  const auto range = [&](Json& of) {
     if (std::isfinite(f.doc.lo)) of["minimum"] = f.doc.lo;
     if (std::isfinite(f.doc.hi)) of["maximum"] = f.doc.hi;
   };
@@ -274,7 +313,7 @@ std::string field_schema(const FieldRef& f) {
   }
   if (f.doc.needed) s.erase("default");
   s["description"] = std::string(f.doc.help) + (f.doc.unit.empty() ? "" : " [" + std::string(f.doc.unit) + "]");
-  return s.dump();
+  return s;
 }
 
 }  // namespace osteo

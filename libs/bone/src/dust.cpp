@@ -6,6 +6,7 @@
 
 #include "osteo/base/files.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/grid/brick_places.h"
 
 namespace osteo {
 namespace {
@@ -263,7 +264,7 @@ void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {
   const Vec3 middle = start_mm + axis * (tool.start_mm + tool.length_mm / 2);
   const double reach = tool.length_mm / 2 + tool.largest_radius_mm();
   in_ball(middle, reach, [&](Ijk c, std::uint32_t& units, Vec3) {
-    const Vec3 p = frame.world_from_index({double(c.i), double(c.j), double(c.k)}) - start_mm - axis * tool.start_mm;
+    const Vec3 p = place_of_voxel_mm(frame, c) - start_mm - axis * tool.start_mm;
     const double t = dot(p, axis), foot = tool.foot_mm(length(p - axis * t), t);
     const Vec3 out = p - axis * foot;
     const double inside = tool.radius_at_mm(foot) - length(out);
@@ -284,7 +285,7 @@ void Dust::push(const RoundCone& tool, Vec3 start_mm, Vec3 axis) {
                       static_cast<int>(std::lround(c.k + n.z * (far + s)))};
       const Ijk to = s == 1 ? aside : stepped(c, axis_, -sign_ * s);
       if (to == c || solid(to) || !in_reach(to)) continue;
-      const Vec3 q = frame.world_from_index({double(to.i), double(to.j), double(to.k)}) - start_mm - axis * tool.start_mm;
+      const Vec3 q = place_of_voxel_mm(frame, to) - start_mm - axis * tool.start_mm;
       const double along = dot(q, axis), off = length(q - axis * along), its_foot = tool.foot_mm(off, along);
       if (portable::hypot(off, along - its_foot) < tool.radius_at_mm(its_foot)) continue;
       *cell(to, true) += units;

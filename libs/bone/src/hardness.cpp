@@ -7,6 +7,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/grid/sampler.h"
 
 namespace osteo {
@@ -40,8 +41,7 @@ Hardness::Hardness(const BrickGrid& bone, const SparseGrid& hu, const HardnessLa
   const GridSampler sampler(hu);
   for (VoxelKey v = 0; v < steps_.size(); ++v) {
     if (bone.value(v) <= 0) continue;
-    const Ijk c = bone.coordinate(v);
-    const auto value = static_cast<double>(sampler.nearest(bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)})));
+    const auto value = static_cast<double>(sampler.nearest(place_of_voxel_mm(bone, v)));
     if (value == hu.background) continue;
     steps_[v] = static_cast<std::uint8_t>(std::lround(64 * law_.at(value)));
   }

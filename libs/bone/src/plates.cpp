@@ -6,6 +6,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
@@ -28,9 +29,7 @@ TriMesh surface_of(const std::function<double(Vec3)>& distance, Vec3 lo, Vec3 hi
       for (int i = 0; i < n[0]; ++i) bricks.push_back({i, j, k});
   BrickGrid g(f, std::move(bricks));
   for (VoxelKey v = 0; v < g.brick_count() * BrickGrid::kVoxels; ++v) {
-    const Ijk c = g.coordinate(v);
-    const Vec3 p = f.world_from_index({double(c.i), double(c.j), double(c.k)});
-    g.set(v, static_cast<float>(std::clamp(0.5 - distance(p) / h, 0.0, 1.0)));
+    g.set(v, static_cast<float>(std::clamp(0.5 - distance(place_of_voxel_mm(g, v)) / h, 0.0, 1.0)));
   }
   return surface_nets(g).mesh;
 }

@@ -1,17 +1,15 @@
 #include "describe.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
+#include "osteo/base/json_document.h"
 #include "osteo/pipeline/formats.h"
 
 namespace osteo::cli {
 namespace {
-
-using nlohmann::ordered_json;
 
 std::string range_text(const FieldRef& f) {
   const FieldDoc& d = f.doc;
@@ -143,12 +141,12 @@ std::vector<FieldRef> common_fields() {
   return fields_of<Common>(params);
 }
 
-ordered_json schema_of(const FieldRef& f) {
-  return ordered_json::parse(field_schema(f));
+Json schema_of(const FieldRef& f) {
+  return field_schema(f);
 }
 
 // A parameter may also be a variable of the pipeline: "${spacing_mm}".
-ordered_json or_variable(const ordered_json& schema) {
+Json or_variable(const Json& schema) {
   return {{"anyOf", {schema, {{"type", "string"}, {"pattern", "\\$\\{[A-Za-z0-9_]+\\}"}}}}};
 }
 
@@ -295,14 +293,14 @@ std::string stage_xml(Stage& stage) {
 
 std::string stage_json(Stage& stage) {
   const StageInfo& info = stage.info();
-  ordered_json j;
+  Json j;
   j["name"] = info.name;
   j["version"] = info.version;
   j["synopsis"] = info.synopsis;
   const auto ports = [](const std::vector<Port>& list) {
-    auto a = ordered_json::array();
+    auto a = Json::list();
     for (const Port& p : list) {
-      ordered_json o{{"name", p.name}, {"optional", p.optional}, {"help", p.help}};
+      Json o{{"name", p.name}, {"optional", p.optional}, {"help", p.help}};
       for (const DataKind k : p.kinds) o["kinds"].push_back(kind_name(k));
       a.push_back(o);
     }
@@ -310,13 +308,13 @@ std::string stage_json(Stage& stage) {
   };
   j["inputs"] = ports(info.inputs);
   j["outputs"] = ports(info.outputs);
-  j["params"] = ordered_json::object();
+  j["params"] = Json::object();
   for (const FieldRef& f : stage.fields()) j["params"][std::string(f.doc.name)] = schema_of(f);
   return j.dump(2) + "\n";
 }
 
 std::string pipeline_schema(const Program& program) {
-  ordered_json root;
+  Json root;
   root["$schema"] = "https://json-schema.org/draft/2020-12/schema";
   root["title"] = "Osteotome pipeline";
   root["type"] = "object";
@@ -330,11 +328,11 @@ std::string pipeline_schema(const Program& program) {
                     {"additionalProperties",
                      {{"type", "object"},
                       {"additionalProperties", false},
-                      {"properties", {{"help", {{"type", "string"}}}, {"default", ordered_json::object()}}}}}};
-  auto any = ordered_json::array();
+                      {"properties", {{"help", {{"type", "string"}}}, {"default", Json::object()}}}}}};
+  auto any = Json::list();
   for (const auto& name : program.registry.names()) {
     const auto stage = program.registry.make(name);
-    ordered_json s;
+    Json s;
     s["type"] = "object";
     s["title"] = stage->info().synopsis;
     s["additionalProperties"] = false;
@@ -342,7 +340,7 @@ std::string pipeline_schema(const Program& program) {
     auto& sp = s["properties"];
     sp["id"] = {{"type", "string"}, {"pattern", "^[^.]+$"}};
     sp["stage"] = {{"const", name}};
-    ordered_json in{{"type", "object"}, {"additionalProperties", false}, {"properties", ordered_json::object()}};
+    Json in{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
     for (const Port& port : stage->info().inputs) {
       in["properties"][port.name] = {
           {"description", port.help + " (" + kinds_text(port.kinds) + ")"},
@@ -351,10 +349,10 @@ std::string pipeline_schema(const Program& program) {
       if (!port.optional) in["required"].push_back(port.name);
     }
     sp["in"] = in;
-    ordered_json params{{"type", "object"}, {"additionalProperties", false}, {"properties", ordered_json::object()}};
+    Json params{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
     for (const FieldRef& f : stage->fields()) params["properties"][std::string(f.doc.name)] = or_variable(schema_of(f));
     sp["params"] = params;
-    ordered_json outputs{{"type", "object"}, {"additionalProperties", false}, {"properties", ordered_json::object()}};
+    Json outputs{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
     for (const Port& port : stage->info().outputs) outputs["properties"][port.name] = {{"type", "string"}, {"description", port.help}};
     sp["out"] = outputs;
     any.push_back(s);

@@ -1,8 +1,8 @@
 #include "progress.h"
+#include "osteo/base/json_document.h"
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <ostream>
 
 namespace osteo::cli {
@@ -35,7 +35,7 @@ void ProgressPrinter::update(double fraction, std::string_view activity) {
   if (fraction <= shown_ || (fraction - shown_ < 0.01 && fraction < 1)) return;
   shown_ = fraction;
   if (style_ == ProgressStyle::json) {
-    nlohmann::ordered_json line;
+    Json line;
     line["progress"] = std::round(fraction * 1000) / 1000;
     line["activity"] = activity_;
     err_ << line.dump() << '\n' << std::flush;

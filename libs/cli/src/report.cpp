@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/pipeline/report_json.h"
 
 namespace osteo::cli {
@@ -56,16 +56,15 @@ std::pair<std::string, std::string> fact_text(const std::string& key, const Repo
 std::string error_json(const Error& error) {
   const auto* doc =
       std::find_if(std::begin(exit_code_table), std::end(exit_code_table), [&](const auto& d) { return d.code == error.code(); });
-  nlohmann::ordered_json j;
+  Json j;
   j["error"] = {{"exit_code", static_cast<int>(error.code())},
                 {"name", doc == std::end(exit_code_table) ? "" : std::string(doc->name)},
                 {"message", error.what()},
                 {"advice", error.advice()}};
   if (const auto* e = dynamic_cast<const ErrorWithDocument*>(&error)) {
-    auto document = nlohmann::ordered_json::parse(e->document().json, nullptr, false);
-    j[e->port()] = document.is_discarded() ? nlohmann::ordered_json(e->document().json) : std::move(document);
+    j[e->port()] = Json::parse(e->document().json).value_or(e->document().json);
   }
-  return j.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return j.dump(2) + "\n";
 }
 
 void print_results(const std::vector<NodeResult>& results, Invocation& invocation) {
@@ -90,14 +89,14 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
     }
   }
   if (!invocation.common.json) return;
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  Json list = Json::list();
   for (const NodeResult& r : results) {
-    nlohmann::ordered_json o{{"id", r.id},           {"stage", r.stage},   {"reused", r.reused},
-                             {"seconds", r.seconds}, {"params", r.params}, {"report", report_to_json(r.report)}};
+    Json o{{"id", r.id},           {"stage", r.stage},   {"reused", r.reused},
+           {"seconds", r.seconds}, {"params", r.params}, {"report", report_to_json(r.report)}};
     for (const auto& [port, path] : r.outputs) o["outputs"][port] = path.string();
     list.push_back(o);
   }
-  invocation.out << nlohmann::ordered_json{{"stages", list}, {"peak_memory_mb", peak_memory_mb()}}.dump(2) << '\n';
+  invocation.out << Json{{"stages", list}, {"peak_memory_mb", peak_memory_mb()}}.dump(2) << '\n';
 }
 
 }  // namespace osteo::cli

@@ -108,30 +108,4 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
   return result;
 }
 
-StageInfo ImportStage::info() {
-  return {
-      .name = "import",
-      .version = 2,
-      .synopsis = "a CT from DICOM, NRRD, NIfTI, MetaImage or VTI as one volume in HU",
-      .description =
-          "Takes a folder of DICOM files, a DICOMDIR, a zip, or one volume file, applies the HU scale and places each voxel in LPS mm, "
-          "each slice where its own position says. Even, straight slices are taken voxel for voxel; a tilted gantry or uneven distances "
-          "are resampled onto upright slices. What cannot be placed rightly is refused. Beside the output a verdict (JSON) says what was "
-          "found, which slice came from which file, and what a person should do. 'osteo import --list FOLDER' shows the series.",
-      .inputs = {{"source", {DataKind::source}, "DICOM folder, DICOMDIR, zip, or one slice of a series, or a volume file"}},
-      .outputs = {{"image", {DataKind::image}, "CT in HU"},
-                  {"verdict", {DataKind::document}, "what was found, also when the series is refused", true, ".verdict.json"}},
-      .references = {"DICOM PS3.3 C.7.6.2, Image Plane Module", "DICOM PS3.3 C.7.6.16, Multi-frame Functional Groups"},
-      .example = "osteo import DICOM_FOLDER ct.nrrd"};
-}
-
-std::vector<Data> ImportStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  try {
-    Imported imported = import_ct(std::get<Source>(inputs[0]).path, params, context);
-    return {std::move(imported.image), Document{to_json(imported.verdict)}};
-  } catch (const Refused& e) {
-    throw ErrorWithDocument(e, "verdict", {to_json(e.verdict())});
-  }
-}
-
 }  // namespace osteo

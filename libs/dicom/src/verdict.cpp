@@ -2,25 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
+#include "osteo/base/json_document.h"
 
 namespace osteo {
 namespace {
-
-using nlohmann::ordered_json;
 
 // Ten micrometres are the promise; a hundredth of that is enough to print.
 double tidy(double v) {
   const double r = std::round(v * 1e4) / 1e4;
   return r == 0 ? 0.0 : r;
 }
-ordered_json triple(Vec3 v) {
+Json triple(Vec3 v) {
   return {tidy(v.x), tidy(v.y), tidy(v.z)};
 }
-ordered_json direction(Vec3 v) {
+Json direction(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
@@ -46,12 +44,12 @@ std::string Verdict::status() const {
 
 std::string to_json(const Verdict& v) {
   static constexpr const char* kSeverity[] = {"info", "warning", "error"};
-  ordered_json j;
+  Json j;
   j["osteotome_verdict"] = 1;
   j["status"] = v.status();
-  j["findings"] = ordered_json::array();
+  j["findings"] = Json::list();
   for (const Finding& f : v.findings) {
-    ordered_json e{{"code", f.code}, {"severity", kSeverity[static_cast<int>(f.severity)]}, {"message", f.message}};
+    Json e{{"code", f.code}, {"severity", kSeverity[static_cast<int>(f.severity)]}, {"message", f.message}};
     if (!f.advice.empty()) e["advice"] = f.advice;
     if (!f.files.empty()) e["files"] = f.files;
     j["findings"].push_back(std::move(e));
@@ -83,9 +81,9 @@ std::string to_json(const Verdict& v) {
         {"axes", orientation_code(v.output)}};
   }
   if (v.values.checked) {
-    ordered_json values{{"hu_min", v.values.hu_min}, {"hu_max", v.values.hu_max}, {"plausible_hu", v.values.plausible}};
-    values["air_hu"] = v.values.has_air ? ordered_json(tidy(v.values.air_hu)) : ordered_json(nullptr);
-    values["soft_tissue_hu"] = v.values.has_soft_tissue ? ordered_json(tidy(v.values.soft_tissue_hu)) : ordered_json(nullptr);
+    Json values{{"hu_min", v.values.hu_min}, {"hu_max", v.values.hu_max}, {"plausible_hu", v.values.plausible}};
+    values["air_hu"] = v.values.has_air ? Json(tidy(v.values.air_hu)) : Json();
+    values["soft_tissue_hu"] = v.values.has_soft_tissue ? Json(tidy(v.values.soft_tissue_hu)) : Json();
     values["padding"] = {{"source", v.values.padding_source}, {"share", tidy(v.values.padding_share)}};
     if (v.values.padding_source != "none") values["padding"]["hu"] = tidy(v.values.padding_hu);
     values["saturated_mm3"] = tidy(v.values.saturated_mm3);
@@ -94,7 +92,7 @@ std::string to_json(const Verdict& v) {
     j["values"] = std::move(values);
   }
   if (v.source == "DICOM") {
-    j["gaps"] = ordered_json::array();
+    j["gaps"] = Json::list();
     for (const SliceGap& g : v.gaps) {
       j["gaps"].push_back({{"after", g.after},
                            {"before", g.before},
@@ -103,42 +101,45 @@ std::string to_json(const Verdict& v) {
                            {"missing", g.missing},
                            {"filled", g.filled}});
     }
-    j["slices"] = ordered_json::array();
+    j["slices"] = Json::list();
     for (const SliceRecord& s : v.slices) {
-      ordered_json e{{"file", s.file},
-                     {"position_lps_mm", triple(s.position_mm)},
-                     {"along_mm", tidy(s.along_mm)},
-                     {"output_slice", tidy(s.output_index)}};
+      Json e{{"file", s.file},
+             {"position_lps_mm", triple(s.position_mm)},
+             {"along_mm", tidy(s.along_mm)},
+             {"output_slice", tidy(s.output_index)}};
       if (s.frame > 0) e["frame"] = s.frame;
       j["slices"].push_back(std::move(e));
     }
-    j["set_aside"] = ordered_json::array();
+    j["set_aside"] = Json::list();
     for (const FileSetAside& f : v.set_aside) j["set_aside"].push_back({{"file", f.file}, {"code", f.code}, {"why", f.why}});
   }
-  return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return j.dump(2) + "\n";
 }
 
 VerdictSummary read_verdict(std::string_view text) {
-  const auto no_verdict = [](const std::string& why) { return Error(ExitCode::corrupt, "this is no verdict of an import: " + why); };
-  const ordered_json j = ordered_json::parse(text, nullptr, false);
-  if (j.is_discarded() || !j.is_object()) throw no_verdict("not JSON");
   try {
-    if (j.at("osteotome_verdict").get<int>() != 1) throw no_verdict("of an unknown version");
+    const JsonFile file(text, "verdict", ExitCode::corrupt);
+    file.require_format("osteotome_verdict");
+    const auto text_of = [&](const JsonValue& object, const char* key) {
+      return file.text(file.need(object, "", key), std::string("\"") + key + "\"");
+    };
     VerdictSummary summary;
-    summary.status = j.at("status").get<std::string>();
-    for (const auto& f : j.at("findings")) {
+    summary.status = text_of(file.root(), "status");
+    for (const JsonValue& f : file.list(file.need(file.root(), "", "findings"), "\"findings\"")) {
       Finding finding;
-      finding.code = f.at("code").get<std::string>();
-      const auto severity = f.at("severity").get<std::string>();
+      finding.code = text_of(f, "code");
+      const std::string severity = text_of(f, "severity");
       finding.severity = severity == "error" ? Severity::error : severity == "warning" ? Severity::warning : Severity::info;
-      finding.message = f.at("message").get<std::string>();
-      finding.advice = f.value("advice", "");
-      if (f.contains("files")) finding.files = f.at("files").get<std::vector<std::string>>();
+      finding.message = text_of(f, "message");
+      if (f.find("advice") != nullptr) finding.advice = text_of(f, "advice");
+      if (const JsonValue* const files = f.find("files"); files != nullptr) {
+        for (const JsonValue& name : file.list(*files, "\"files\"")) finding.files.push_back(file.text(name, "\"files\""));
+      }
       summary.findings.push_back(std::move(finding));
     }
     return summary;
-  } catch (const nlohmann::json::exception& e) {
-    throw no_verdict(json_complaint(e));
+  } catch (const Error& e) {
+    throw e.in("this is no verdict of an import");
   }
 }
 

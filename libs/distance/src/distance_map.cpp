@@ -9,6 +9,7 @@
 #include "block_mapper.h"
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
+#include "osteo/grid/brick_values.h"
 
 namespace osteo {
 namespace {
@@ -175,6 +176,16 @@ DistanceMap DistanceMapper::run(const VoxelBits* wanted, double inside_mm, doubl
     }
   });
   return map;
+}
+
+SparseGrid to_sparse(const DistanceMap& map) {
+  std::vector<float> values(map.distance_mm.size());
+  float farthest = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = static_cast<float>(map.distance_mm[i]);
+    if (std::isfinite(values[i])) farthest = std::max(farthest, values[i]);
+  }
+  return to_sparse(map.frame, "distance_mm", map.bricks, map.stored, values, farthest);
 }
 
 }  // namespace osteo

@@ -1,6 +1,6 @@
 #include "osteo/grid/brick_values.h"
 
-#include "vdb.h"
+#include "osteo/grid/vdb.h"
 
 namespace osteo {
 

@@ -8,7 +8,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
 #include "osteo/grid/brick_grid.h"
-#include "vdb.h"
+#include "osteo/grid/vdb.h"
 
 namespace osteo {
 namespace {
@@ -415,27 +415,6 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   }
   context.progress(1.0);
   return result;
-}
-
-StageInfo ResampleStage::info() {
-  return {.name = "resample",
-          .version = 4,
-          .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
-          .description =
-              "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "
-              "The volume of bone is kept and reported. Only voxels with bone are stored.",
-          .inputs = {{"image", {DataKind::image}, "CT in HU"}, {"mask", {DataKind::labels}, "bone mask on the same voxels"}},
-          .outputs = {{"bone", {DataKind::grid}, "bone density, 0 to 1"},
-                      {"hu", {DataKind::grid}, "CT value in the voxels that hold bone", true}},
-          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
-                         "R. Keys, Cubic Convolution Interpolation for Digital Image Processing, IEEE TASSP 1981",
-                         "K. Museth, VDB: High-Resolution Sparse Volumes with Dynamic Topology, ACM TOG 2013"},
-          .example = "osteo resample ct.nrrd bone.nrrd bone.vdb --spacing-mm 0.5"};
-}
-
-std::vector<Data> ResampleStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  ResampledBone bone = resample_bone(std::get<Image>(inputs[0]), std::get<Labels>(inputs[1]), params, context);
-  return {bone.density, bone.hu};
 }
 
 }  // namespace osteo

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vdb.h"
+#include "osteo/grid/vdb.h"
 
 namespace osteo {
 

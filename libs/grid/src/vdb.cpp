@@ -1,4 +1,4 @@
-#include "vdb.h"
+#include "osteo/grid/vdb.h"
 
 #include <openvdb/tools/Prune.h>
 

@@ -1,7 +1,6 @@
 #include "osteo/haptics/vibration.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -13,35 +12,34 @@ namespace osteo {
 
 VibrationSpectrum parse_vibration(std::string_view text, const std::string& name) {
   VibrationSpectrum s;
-  std::string where = "header";
-  const auto refuse = [&](const std::string& what) { throw Error(ExitCode::usage, name + ": " + where + ": " + what); };
-  try {
-    const auto j = nlohmann::json::parse(text);
-    if (j.at("osteotome_vibration") != 1) refuse("\"osteotome_vibration\" must be 1");
-    where = "band_hz";
-    const double lo = j.at("band_hz").at(0), hi = j.at("band_hz").at(1);
-    if (!(lo >= 0 && hi > lo && hi <= 1000)) refuse("must be two rising frequencies up to 1000");
-    for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
-      const auto index = static_cast<std::size_t>(kind);
-      const std::string key(EnumNames<BurrKind>::values[index]);
-      int number = 0;
-      for (const auto& p : j.at(key)) {
-        where = key + " " + std::to_string(++number);
-        const VibrationSpectrum::Peak peak{p.at("frequency_hz"), p.at("idle_n"), p.at("per_n")};
-        if (!(peak.frequency_hz > 0) || !(peak.idle_n >= 0) || !(peak.per_n >= 0) || peak.idle_n > 10 || peak.per_n > 1)
-          refuse("needs a frequency above 0, idle_n from 0 to 10 and per_n from 0 to 1");
-        if (peak.frequency_hz >= lo && peak.frequency_hz <= hi) s.by_kind[index].push_back(peak);
-      }
-      if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks) refuse("has more than 16 peaks in the band");
+  const JsonFile file(text, name);
+  const JsonValue& root = file.root();
+  file.require_format("osteotome_vibration");
+  file.allow(root, "", std::vector<std::string>{"osteotome_vibration", "$schema", "about", "source", "band_hz", "cutting", "diamond"});
+  const auto& band = file.list(file.need(root, "", "band_hz"), "\"band_hz\"", 2);
+  const double lo = file.number(band[0], "\"band_hz\"", 0, 1000), hi = file.number(band[1], "\"band_hz\"", 0, 1000);
+  if (hi <= lo) throw file.wrong(band[1], "\"band_hz\" must be two rising frequencies up to 1000");
+  for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
+    const auto index = static_cast<std::size_t>(kind);
+    const std::string key(EnumNames<BurrKind>::values[index]);
+    const JsonValue& peaks = file.need(root, "", key);
+    int number = 0;
+    for (const JsonValue& p : file.list(peaks, "\"" + key + "\"")) {
+      const std::string where = key + " " + std::to_string(++number);
+      file.allow(p, where, std::vector<std::string>{"frequency_hz", "idle_n", "per_n", "about"});
+      const auto value = [&](const char* name_of, double least, double most) {
+        return file.number(file.need(p, where, name_of), where + ": \"" + name_of + "\"", least, most);
+      };
+      const VibrationSpectrum::Peak peak{value("frequency_hz", 0.001, 1e6), value("idle_n", 0, 10), value("per_n", 0, 1)};
+      if (peak.frequency_hz >= lo && peak.frequency_hz <= hi) s.by_kind[index].push_back(peak);
     }
-  } catch (const nlohmann::json::exception& e) {
-    refuse(json_complaint(e));
+    if (s.by_kind[index].size() > VibrationSpectrum::kMostPeaks) throw file.wrong(peaks, key + " has more than 16 peaks in the band");
   }
   return s;
 }
 
 VibrationSpectrum load_vibration(const std::filesystem::path& path) {
-  return parse_vibration(read_text(path), "'" + path.string() + "'");
+  return parse_vibration(read_text(path), path.string());
 }
 
 std::string_view default_vibration_json() {

@@ -148,37 +148,4 @@ Labels crop(const Labels& labels, const Box& box) {
   return {cut<std::uint8_t>(labels, box), labels.structures};
 }
 
-StageInfo CropStage::info() {
-  return {.name = "crop",
-          .version = 1,
-          .synopsis = "a region cut out: a box in mm, a temporal bone, the jaw",
-          .description =
-              "Cuts whole voxels; nothing is resampled, everything stays where it was in the patient. The temporal bones and the jaw are "
-              "found from the skull; the box that was cut is reported, so that it can be moved with --centre-mm.",
-          .inputs = {{"image", {DataKind::image}, "CT in HU"}, {"labels", {DataKind::labels}, "label map to cut alike", true}},
-          .outputs = {{"image", {DataKind::image}, "the region"}, {"labels", {DataKind::labels}, "label map of the region", true}},
-          .references = {},
-          .example = "osteo crop ct.nrrd ear.nrrd --region left_temporal"};
-}
-
-std::vector<Data> CropStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  const auto& ct = std::get<Image>(inputs[0]);
-  const auto* const labels = std::get_if<Labels>(&inputs[1]);
-  if (params.region == Region::whole) {
-    if (vec(params.size_mm) != Vec3{}) throw Error(ExitCode::usage, "--size-mm needs a region: --region box");
-    return {ct, labels != nullptr ? Data(*labels) : Data(std::monostate{})};
-  }
-  const Box box = find_region(ct, params);
-  const Vec3 centre = (box.lo_mm + box.hi_mm) * 0.5, size = box.hi_mm - box.lo_mm;
-  const auto text = [](Vec3 v) {
-    const auto r = [](double x) { return format_number(std::round(x * 10) / 10); };
-    return r(v.x) + "," + r(v.y) + "," + r(v.z);
-  };
-  context.report("centre_mm", text(centre));
-  context.report("size_mm", text(size));
-  Data cut_labels;
-  if (labels != nullptr) cut_labels = crop(*labels, box);
-  return {crop(ct, box), cut_labels};
-}
-
 }  // namespace osteo

@@ -259,27 +259,4 @@ Phantom make_phantom(const PhantomParams& p, const Context& context) {
   return result;
 }
 
-StageInfo PhantomStage::info() {
-  return {.name = "phantom",
-          .version = 1,
-          .synopsis = "a synthetic CT of a head whose every boundary is known",
-          .description =
-              "Cortical and cellular bone, facial nerve canals, sigmoid sinuses, ossicles, a jaw, and a bead on the left side "
-              "only. Voxels hold the mean over their volume plus noise (--seed). Give a folder as output for a DICOM series.",
-          .inputs = {},
-          .outputs = {{"image", {DataKind::image}, "CT in HU"},
-                      {"labels",
-                       {DataKind::labels},
-                       "exact tissue at each voxel centre: 2 cortical, 3 cellular, 4 mandible, "
-                       "5 ossicle, 6 facial nerve, 7 sigmoid sinus, 8 left marker",
-                       true}},
-          .references = {},
-          .example = "osteo phantom ct.nrrd --labels-out labels.nrrd --region temporal --spacing-mm 0.5"};
-}
-
-std::vector<Data> PhantomStage::run(const Params& params, std::span<const Data>, const Context& context) {
-  Phantom phantom = make_phantom(params, context);
-  return {phantom.ct, phantom.labels};
-}
-
 }  // namespace osteo

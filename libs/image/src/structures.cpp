@@ -118,24 +118,4 @@ Labels name_structures(const Labels& labels, const StructuresParams& params, con
   return result;
 }
 
-StageInfo StructuresStage::info() {
-  return {.name = "structures",
-          .version = 2,
-          .synopsis = "a label map of another program as named structures of a case",
-          .description =
-              "Takes NRRD (with the names of 3D Slicer), NIfTI, MetaImage, VTI or DICOM SEG, names and colours each value, and checks that "
-              "it lies "
-              "where the CT lies.",
-          .inputs = {{"labels", {DataKind::labels}, "label map: nerves, vessels, ossicles"},
-                     {"image", {DataKind::image}, "CT that it belongs to, for a check", true}},
-          .outputs = {{"structures", {DataKind::labels}, "label map with names and colours"}},
-          .references = {},
-          .example = "osteo structures segmentation.dcm structures.seg.nrrd --image ct.nrrd --names '1=facial nerve'"};
-}
-
-std::vector<Data> StructuresStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  const auto* const ct = std::get_if<Image>(&inputs[1]);
-  return {name_structures(std::get<Labels>(inputs[0]), params, ct, context)};
-}
-
 }  // namespace osteo

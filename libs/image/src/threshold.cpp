@@ -124,24 +124,4 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   return {ct.frame, mask};
 }
 
-StageInfo ThresholdStage::info() {
-  return {
-      .name = "threshold",
-      .version = 2,
-      .synopsis = "bone mask from a CT by Hounsfield units",
-      .description =
-          "Marks the voxels between two HU values, then cleans the mask: table and head holder, streaks near metal, hysteresis, closing, "
-          "filling of cavities, and removal of small pieces, each off unless asked for except the last. With --preset the lower value "
-          "is found from the scan: cortical for thick bone, cellular for the mastoid's walls, thin for the orbit's.",
-      .inputs = {{"image", {DataKind::image}, "CT in HU"}},
-      .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"}},
-      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 3.2.1",
-                     "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. Med. Biol. 1999"},
-      .example = "osteo threshold ct.nrrd bone.nrrd --lower 250 --core 500"};
-}
-
-std::vector<Data> ThresholdStage::run(const Params& params, std::span<const Data> inputs, const Context& context) {
-  return {threshold(std::get<Image>(inputs[0]), params, context)};
-}
-
 }  // namespace osteo

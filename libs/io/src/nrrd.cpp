@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "osteo/base/error.h"
@@ -108,53 +109,56 @@ void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t
   if (out_done < size) fail(path, "the compressed voxels end early or are damaged", "copy the file again from its source");
 }
 
-}  // namespace
-
-RawVolume read_nrrd(const fs::path& path) {
-  const auto bytes = read_file(path);
-  const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (!all.starts_with("NRRD")) fail(path, "this is not an NRRD file");
-  std::map<std::string, std::string, std::less<>> fields;
+struct Header {
+  std::map<std::string, std::string, std::less<>> fields;  // keys in lower case
   std::map<std::string, std::string> notes;
+  std::optional<std::size_t> body;  // where the voxels begin, unless they are in another file
+
+  [[nodiscard]] std::string get(std::string_view key) const {
+    const auto it = fields.find(key);
+    return it == fields.end() ? std::string() : it->second;
+  }
+};
+
+Header parse_header(std::string_view all, const fs::path& path) {
+  if (!all.starts_with("NRRD")) fail(path, "this is not an NRRD file");
+  Header header;
   std::size_t at = all.find('\n');
-  bool detached = true;
   while (at != std::string_view::npos && ++at < all.size()) {
     const std::size_t end = all.find('\n', at);
     std::string_view line = all.substr(at, end == std::string_view::npos ? end : end - at);
     if (line.ends_with('\r')) line.remove_suffix(1);
     at = end;
     if (line.empty()) {
-      detached = false;
+      header.body = std::min(at, all.size() - 1) + 1;
       break;
     }
     if (line.starts_with('#')) continue;
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos) fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
     if (line.substr(colon).starts_with(":=")) {
-      notes[std::string(line.substr(0, colon))] = std::string(line.substr(colon + 2));
+      header.notes[std::string(line.substr(0, colon))] = std::string(line.substr(colon + 2));
       continue;
     }
     std::string_view value = line.substr(colon + 1);
     while (value.starts_with(' ') || value.starts_with('\t')) value.remove_prefix(1);
-    fields[lower_case(std::string(line.substr(0, colon)))] = std::string(value);
+    header.fields[lower_case(std::string(line.substr(0, colon)))] = std::string(value);
   }
-  const auto get = [&](std::string_view key) {
-    const auto it = fields.find(key);
-    return it == fields.end() ? std::string() : it->second;
-  };
+  return header;
+}
 
-  RawVolume raw;
-  raw.notes = std::move(notes);
-  const auto type = kTypes.find(get("type"));
-  if (type == kTypes.end()) fail(path, "the scalar type '" + get("type") + "' is not supported");
+// Sets type, layers and dims; leaves "space directions" with the three of space.
+void read_shape(Header& header, RawVolume& raw, const fs::path& path) {
+  const auto type = kTypes.find(header.get("type"));
+  if (type == kTypes.end()) fail(path, "the scalar type '" + header.get("type") + "' is not supported");
   raw.type = type->second;
-  auto sizes = numbers_in(get("sizes"));
-  const std::string kinds = lower_case(get("kinds"));
+  auto sizes = numbers_in(header.get("sizes"));
+  const std::string kinds = lower_case(header.get("kinds"));
   if (sizes.size() == 4 && (kinds.starts_with("list ") || kinds.starts_with("vector "))) {
     if (!(sizes[0] >= 1 && sizes[0] <= 255)) fail(path, "it has " + format_number(sizes[0]) + " layers");
     raw.layers = static_cast<int>(sizes[0]);
     sizes.erase(sizes.begin());
-    std::string& directions = fields["space directions"];
+    std::string& directions = header.fields["space directions"];
     if (directions.starts_with("none")) directions.erase(0, 4);
   }
   if (sizes.size() != 3) fail(path, "it has " + std::to_string(sizes.size()) + " axes; a volume has three");
@@ -162,51 +166,51 @@ RawVolume read_nrrd(const fs::path& path) {
     if (!(sizes[a] >= 1 && sizes[a] <= 65536)) fail(path, "the size " + format_number(sizes[a]) + " is out of range");
     raw.frame.dims[a] = static_cast<int>(sizes[a]);
   }
+}
 
-  // World axes: LPS unless the header says RAS or LAS.
-  const std::string space = lower_case(get("space"));
+// World axes: LPS unless the header says RAS or LAS.
+void read_place(const Header& header, Frame& frame, const fs::path& path) {
+  const std::string space = lower_case(header.get("space"));
   Vec3 to_lps{1, 1, 1};
   if (space == "ras" || space == "right-anterior-superior") to_lps = {-1, -1, 1};
   if (space == "las" || space == "left-anterior-superior") to_lps = {1, -1, 1};
-  if (!get("space directions").empty()) {
-    const auto d = numbers_in(get("space directions"));
+  if (!header.get("space directions").empty()) {
+    const auto d = numbers_in(header.get("space directions"));
     if (d.size() != 9) fail(path, "'space directions' needs three vectors of three numbers");
     for (std::size_t a = 0; a < 3; ++a) {
       const Vec3 v{d[3 * a] * to_lps.x, d[3 * a + 1] * to_lps.y, d[3 * a + 2] * to_lps.z};
-      raw.frame.spacing_mm[a] = length(v);
-      raw.frame.direction.column[a] = normalized(v);
+      frame.spacing_mm[a] = length(v);
+      frame.direction.column[a] = normalized(v);
     }
-  } else if (!get("spacings").empty()) {
-    const auto s = numbers_in(get("spacings"));
+  } else if (!header.get("spacings").empty()) {
+    const auto s = numbers_in(header.get("spacings"));
     if (s.size() != 3) fail(path, "'spacings' needs three numbers");
-    for (std::size_t a = 0; a < 3; ++a) raw.frame.spacing_mm[a] = std::isnan(s[a]) ? 1 : s[a];
+    for (std::size_t a = 0; a < 3; ++a) frame.spacing_mm[a] = std::isnan(s[a]) ? 1 : s[a];
   }
-  if (!get("space origin").empty()) {
-    const auto o = numbers_in(get("space origin"));
+  if (!header.get("space origin").empty()) {
+    const auto o = numbers_in(header.get("space origin"));
     if (o.size() != 3) fail(path, "'space origin' needs three numbers");
-    raw.frame.origin_mm = {o[0] * to_lps.x, o[1] * to_lps.y, o[2] * to_lps.z};
+    frame.origin_mm = {o[0] * to_lps.x, o[1] * to_lps.y, o[2] * to_lps.z};
   }
   try {
-    require_valid(raw.frame);
+    require_valid(frame);
   } catch (const Error& e) {
     throw e.in("'" + path.string() + "'");
   }
+}
 
-  const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
-  std::vector<std::byte> apart;
-  std::span<const std::byte> body;
-  std::string data_file = get("data file");
-  if (data_file.empty()) data_file = get("datafile");
-  if (!data_file.empty()) {
-    if (data_file.find('%') != std::string::npos || data_file == "LIST") fail(path, "several data files are not supported");
-    apart = read_file(path.parent_path() / data_file);
-    body = apart;
-  } else {
-    if (detached) fail(path, "the header does not end and names no data file");
-    body = std::span(bytes).subspan(at + 1);
-  }
-  const auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
-  const std::string encoding = lower_case(get("encoding"));
+// The name of the file that holds the voxels; empty when this one does.
+std::string data_file_of(const Header& header, const fs::path& path) {
+  std::string name = header.get("data file");
+  if (name.empty()) name = header.get("datafile");
+  if (name.find('%') != std::string::npos || name == "LIST") fail(path, "several data files are not supported");
+  if (name.empty() && !header.body) fail(path, "the header does not end and names no data file");
+  return name;
+}
+
+std::shared_ptr<std::byte[]> decoded(const Header& header, std::span<const std::byte> body, std::size_t size, const fs::path& path) {
+  auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
+  const std::string encoding = lower_case(header.get("encoding"));
   if (encoding == "raw") {
     if (body.size() < size) {
       fail(path, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(size),
@@ -218,7 +222,25 @@ RawVolume read_nrrd(const fs::path& path) {
   } else {
     fail(path, "the encoding '" + encoding + "' is not supported", "save it with gzip or raw encoding");
   }
-  const bool big = lower_case(get("endian")) == "big";
+  return voxels;
+}
+
+}  // namespace
+
+RawVolume read_nrrd(const fs::path& path) {
+  const auto bytes = read_file(path);
+  Header header = parse_header({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path);
+  RawVolume raw;
+  raw.notes = std::move(header.notes);
+  read_shape(header, raw, path);
+  read_place(header, raw.frame, path);
+
+  const std::string data_file = data_file_of(header, path);
+  const std::vector<std::byte> apart = data_file.empty() ? std::vector<std::byte>() : read_file(path.parent_path() / data_file);
+  const std::span<const std::byte> body = data_file.empty() ? std::span(bytes).subspan(*header.body) : std::span(apart);
+  const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
+  const auto voxels = decoded(header, body, size, path);
+  const bool big = lower_case(header.get("endian")) == "big";
   if (scalar > 1 && big != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < size; i += scalar) std::reverse(voxels.get() + i, voxels.get() + i + scalar);
   }

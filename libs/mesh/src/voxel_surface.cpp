@@ -5,6 +5,7 @@
 
 #include "index_rows.h"
 #include "osteo/base/parallel.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
@@ -108,8 +109,7 @@ BoneSurface voxel_surface(const BrickGrid& bone, float iso, const Context& conte
     for (const auto& [key, g] : list) {
       vertex_of[key] = static_cast<std::uint32_t>(result.voxels.size());
       result.voxels.push_back(key);
-      const Ijk c = bone.coordinate(key);
-      const Vec3 p = frame.world_from_index({double(c.i), double(c.j), double(c.k)});
+      const Vec3 p = place_of_voxel_mm(bone, key);
       const Vec3 n = normalized(frame.direction * Vec3{static_cast<double>(g[0]), static_cast<double>(g[1]), static_cast<double>(g[2])});
       result.mesh.points_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
       result.mesh.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});

@@ -1,4 +1,4 @@
-#include <nlohmann/json.hpp>
+#include <algorithm>
 
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
@@ -7,97 +7,148 @@
 namespace osteo {
 namespace {
 
-using nlohmann::json;
+using Names = std::vector<std::string>;
+using Variables = std::map<std::string, std::string>;
 
-[[noreturn]] void fail(const std::string& where, const std::string& what, const std::string& advice = {}) {
-  throw Error(ExitCode::usage, "pipeline" + (where.empty() ? "" : " " + where) + ": " + what, advice);
-}
-
-json parse_json(std::string_view text) {
-  try {
-    return json::parse(text, nullptr, true, true);
-  } catch (const json::parse_error& e) {
-    std::size_t line = 1;
-    for (std::size_t i = 0; i + 1 < e.byte && i < text.size(); ++i) line += text[i] == '\n' ? 1 : 0;
-    fail("line " + std::to_string(line), "this is not valid JSON", json_complaint(e));
+// A pipeline file, part by part; whatever is wrong is told with its line.
+class PipelineReader {
+ public:
+  explicit PipelineReader(std::string_view text) : file_(text, "pipeline") {
+    file_.allow(root(), "", Names{"osteotome", "$schema", "name", "description", "variables", "stages"});
+    file_.require_format("osteotome");
   }
-}
 
-void allow_keys(const json& object, const std::string& where, const std::vector<std::string>& known) {
-  if (!object.is_object()) fail(where, "must be an object in braces");
-  for (const auto& [key, value] : object.items()) {
-    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    const std::string near = nearest_name(key, known);
-    fail(where, "the key '" + key + "' is not known", near.empty() ? "" : "did you mean '" + near + "'?");
-  }
-}
-
-std::string scalar_text(const json& value, const std::string& where) {
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
-  if (value.is_number()) return format_number(value.get<double>());
-  if (value.is_array() && value.size() == 3) {
-    return scalar_text(value[0], where) + "," + scalar_text(value[1], where) + "," + scalar_text(value[2], where);
-  }
-  fail(where, "must be a text, a number, true, false, or three numbers");
-}
-
-std::string substitute(std::string text, const std::map<std::string, std::string>& variables, const std::string& where) {
-  for (std::size_t at = text.find("${"); at != std::string::npos; at = text.find("${", at)) {
-    const std::size_t end = text.find('}', at);
-    if (end == std::string::npos) fail(where, "'${' without '}'");
-    const std::string name = text.substr(at + 2, end - at - 2);
-    const auto it = variables.find(name);
-    if (it == variables.end()) fail(where, "the variable '" + name + "' has no value", "give it with --set " + name + "=VALUE");
-    text.replace(at, end - at + 1, it->second);
-    at += it->second.size();
-  }
-  return text;
-}
-
-// A value of the wrong JSON type somewhere deep becomes an Error like any other.
-template <class F>
-auto with_json_errors(F&& read) {
-  try {
-    return read();
-  } catch (const json::exception& e) {
-    fail("", "a value has the wrong type", json_complaint(e));
-  }
-}
-
-std::vector<PipelineVariable> read_variables(std::string_view text) {
-  std::vector<PipelineVariable> result;
-  const json root = parse_json(text);
-  if (!root.contains("variables")) return result;
-  for (const auto& [name, v] : root["variables"].items()) {
-    allow_keys(v, "variable '" + name + "'", {"help", "default"});
-    PipelineVariable variable{name, v.value("help", ""), std::nullopt};
-    for (const json& s : root.value("stages", json::array())) {
-      const json inputs = s.is_object() ? s.value("in", json::object()) : json::object();
-      for (const auto& [port, input] : inputs.items()) {
-        variable.in_file_name |= input.is_object() && input.value("file", json()).dump().find("${" + name + "}") != std::string::npos;
+  /// By name.
+  [[nodiscard]] std::vector<PipelineVariable> variables() const {
+    std::vector<PipelineVariable> result;
+    for (const JsonMember& m : members(root(), "variables", "")) {
+      const std::string where = "variable '" + m.key + "'";
+      file_.allow(m.value, where, Names{"help", "default"});
+      PipelineVariable variable{m.key, text_of(m.value, "help", where), std::nullopt};
+      for (const JsonValue& s : stages()) {
+        if (s.kind != JsonValue::Kind::object) continue;  // told when the stages are read
+        const JsonValue* const in = s.find("in");
+        for (const JsonMember& input : in != nullptr ? in->members : std::vector<JsonMember>{}) {
+          const JsonValue* const file = input.value.find("file");
+          variable.in_file_name |=
+              file != nullptr && scalar(*file, "input '" + input.key + "'").find("${" + m.key + "}") != std::string::npos;
+        }
       }
+      if (const JsonValue* const fallback = m.value.find("default"); fallback != nullptr) variable.fallback = scalar(*fallback, where);
+      result.push_back(std::move(variable));
     }
-    if (v.contains("default")) variable.fallback = scalar_text(v["default"], "variable '" + name + "'");
-    result.push_back(std::move(variable));
+    std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    return result;
   }
-  return result;
+
+  [[nodiscard]] Pipeline pipeline(const Variables& values) const {
+    Pipeline result;
+    result.name = text_of(root(), "name", "");
+    result.description = text_of(root(), "description", "");
+    for (const JsonValue& s : stages()) {
+      const PipelineNode node = read_node(s, "stage " + std::to_string(result.nodes.size() + 1), values);
+      for (const PipelineNode& other : result.nodes) {
+        if (other.id == node.id) throw file_.wrong(s, "stage '" + node.id + "': two stages have this id");
+      }
+      result.nodes.push_back(node);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] const JsonValue& root() const { return file_.root(); }
+  [[nodiscard]] const std::vector<JsonValue>& stages() const { return file_.list(file_.need(root(), "", "stages"), "\"stages\""); }
+
+  // Of an object that may be left out.
+  [[nodiscard]] const std::vector<JsonMember>& members(const JsonValue& object, const std::string& key, const std::string& where) const {
+    static const std::vector<JsonMember> none;
+    const JsonValue* const found = object.find(key);
+    if (found == nullptr) return none;
+    if (found->kind != JsonValue::Kind::object)
+      throw file_.wrong(*found, (where.empty() ? "" : where + ": ") + "\"" + key + "\" must be an object in braces");
+    return found->members;
+  }
+  [[nodiscard]] std::string text_of(const JsonValue& object, const std::string& key, const std::string& where) const {
+    const JsonValue* const found = object.find(key);
+    return found == nullptr ? std::string() : file_.text(*found, (where.empty() ? "" : where + ": ") + "\"" + key + "\"");
+  }
+
+  // A parameter as a flag would have it.
+  [[nodiscard]] std::string scalar(const JsonValue& value, const std::string& where) const {
+    using Kind = JsonValue::Kind;
+    if (value.kind == Kind::text) return value.text;
+    if (value.kind == Kind::flag) return value.flag ? "true" : "false";
+    if (value.kind == Kind::number) return format_number(value.number);
+    if (value.kind == Kind::list && value.items.size() == 3)
+      return scalar(value.items[0], where) + "," + scalar(value.items[1], where) + "," + scalar(value.items[2], where);
+    throw file_.wrong(value, where + ": must be a text, a number, true, false, or three numbers");
+  }
+
+  // The same, with what "${NAME}" stands for.
+  [[nodiscard]] std::string substituted(const JsonValue& value, const Variables& values, const std::string& where) const {
+    std::string text = scalar(value, where);
+    for (std::size_t at = text.find("${"); at != std::string::npos; at = text.find("${", at)) {
+      const std::size_t end = text.find('}', at);
+      if (end == std::string::npos) throw file_.wrong(value, where + ": '${' without '}'");
+      const std::string name = text.substr(at + 2, end - at - 2);
+      const auto it = values.find(name);
+      if (it == values.end())
+        throw file_.wrong(value, where + ": the variable '" + name + "' has no value", "give it with --set " + name + "=VALUE");
+      text.replace(at, end - at + 1, it->second);
+      at += it->second.size();
+    }
+    return text;
+  }
+
+  [[nodiscard]] PipelineNode read_node(const JsonValue& s, const std::string& number, const Variables& values) const {
+    PipelineNode node;
+    file_.allow(s, number, Names{"id", "stage", "in", "params", "out"});
+    node.stage = file_.text(file_.need(s, number, "stage"), number + ": \"stage\"");
+    node.id = s.find("id") != nullptr ? text_of(s, "id", number) : node.stage;
+    const std::string where = "stage '" + node.id + "'";
+    if (node.id.find('.') != std::string::npos) throw file_.wrong(s, where + ": an id has no dots");
+    for (const auto& [port, value] : members(s, "in", where))
+      node.inputs[port] = read_input(value, where + " input '" + port + "'", values);
+    for (const auto& [name, value] : members(s, "params", where))
+      node.params[name] = substituted(value, values, where + " parameter '" + name + "'");
+    for (const auto& [port, value] : members(s, "out", where))
+      node.outputs[port] = substituted(value, values, where + " output '" + port + "'");
+    return node;
+  }
+
+  [[nodiscard]] PipelineNode::Input read_input(const JsonValue& value, const std::string& where, const Variables& values) const {
+    PipelineNode::Input input;
+    if (value.kind == JsonValue::Kind::object) {
+      file_.allow(value, where, Names{"file"});
+      input.file = substituted(file_.need(value, where, "file"), values, where);
+    } else if (value.kind == JsonValue::Kind::text) {
+      const std::size_t dot = value.text.find('.');
+      input.node = value.text.substr(0, dot);
+      if (dot != std::string::npos) input.port = value.text.substr(dot + 1);
+    } else {
+      throw file_.wrong(value, where + ": must be the id of a stage, or {\"file\": \"PATH\"}");
+    }
+    return input;
+  }
+
+  const JsonFile file_;
+};
+
+}  // namespace
+
+std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
+  return PipelineReader(text).variables();
 }
 
-Pipeline read_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
-  const json root = parse_json(text);
-  allow_keys(root, "", {"osteotome", "name", "description", "variables", "stages"});
-  if (!root.contains("osteotome") || root["osteotome"] != 1)
-    fail("", "the key \"osteotome\": 1 is missing", "it says which format the file has");
-  if (!root.contains("stages") || !root["stages"].is_array()) fail("", "the list \"stages\" is missing");
-
-  std::map<std::string, std::string> variables;
-  std::vector<std::string> known;
-  for (const auto& v : read_variables(text)) {
+Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
+  const PipelineReader reader(text);
+  Variables values;
+  Names known;
+  for (const PipelineVariable& v : reader.variables()) {
     known.push_back(v.name);
-    if (v.fallback) variables[v.name] = *v.fallback;
+    if (v.fallback) values[v.name] = *v.fallback;
   }
-  std::map<std::string, std::map<std::string, std::string>> overrides;
+  std::map<std::string, std::map<std::string, std::string>> overrides;  // id -> parameter -> text
   for (const auto& [key, value] : settings) {
     if (const std::size_t dot = key.find('.'); dot != std::string::npos) {
       overrides[key.substr(0, dot)][key.substr(dot + 1)] = value;
@@ -108,69 +159,24 @@ Pipeline read_pipeline(std::string_view text, const std::map<std::string, std::s
       throw Error(ExitCode::usage, "--set " + key + ": the pipeline has no variable '" + key + "'",
                   near.empty() ? "a parameter of one stage is set as --set ID.PARAMETER=VALUE" : "did you mean '" + near + "'?");
     }
-    variables[key] = value;
+    values[key] = value;
   }
-
-  Pipeline pipeline;
-  pipeline.name = root.value("name", "");
-  pipeline.description = root.value("description", "");
-  std::vector<std::string> ids;
-  for (const json& s : root["stages"]) {
-    PipelineNode node;
-    const std::string number = "stage " + std::to_string(pipeline.nodes.size() + 1);
-    allow_keys(s, number, {"id", "stage", "in", "params", "out"});
-    if (!s.contains("stage") || !s["stage"].is_string()) fail(number, "the key \"stage\" is missing");
-    node.stage = s["stage"];
-    node.id = s.value("id", node.stage);
-    const std::string where = "stage '" + node.id + "'";
-    if (node.id.find('.') != std::string::npos) fail(where, "an id has no dots");
-    if (std::find(ids.begin(), ids.end(), node.id) != ids.end()) fail(where, "two stages have this id");
+  Pipeline pipeline = reader.pipeline(values);
+  Names ids;
+  for (PipelineNode& node : pipeline.nodes) {
     ids.push_back(node.id);
-    // Named: the items of a temporary would outlive it.
-    const json inputs = s.value("in", json::object()), params = s.value("params", json::object()), outputs = s.value("out", json::object());
-    for (const auto& [port, value] : inputs.items()) {
-      PipelineNode::Input input;
-      if (value.is_object()) {
-        allow_keys(value, where + " input '" + port + "'", {"file"});
-        input.file = substitute(scalar_text(value.value("file", json()), where), variables, where);
-      } else if (value.is_string()) {
-        const std::string ref = value;
-        const std::size_t dot = ref.find('.');
-        input.node = ref.substr(0, dot);
-        if (dot != std::string::npos) input.port = ref.substr(dot + 1);
-      } else {
-        fail(where + " input '" + port + "'", "must be the id of a stage, or {\"file\": \"PATH\"}");
-      }
-      node.inputs[port] = input;
-    }
-    for (const auto& [name, value] : params.items()) {
-      node.params[name] = substitute(scalar_text(value, where + " parameter '" + name + "'"), variables, where);
-    }
-    for (const auto& [port, value] : outputs.items()) {
-      node.outputs[port] = substitute(scalar_text(value, where + " output '" + port + "'"), variables, where);
-    }
-    if (const auto it = overrides.find(node.id); it != overrides.end()) {
-      for (const auto& [name, value] : it->second) node.params[name] = value;
-      overrides.erase(it);
-    }
-    pipeline.nodes.push_back(std::move(node));
+    const auto it = overrides.find(node.id);
+    if (it == overrides.end()) continue;
+    for (const auto& [name, value] : it->second) node.params[name] = value;
+    overrides.erase(it);
   }
   if (!overrides.empty()) {
-    const std::string near = nearest_name(overrides.begin()->first, ids);
-    throw Error(ExitCode::usage, "--set " + overrides.begin()->first + ".…: the pipeline has no stage '" + overrides.begin()->first + "'",
+    const std::string& id = overrides.begin()->first;
+    const std::string near = nearest_name(id, ids);
+    throw Error(ExitCode::usage, "--set " + id + ".…: the pipeline has no stage '" + id + "'",
                 near.empty() ? "" : "did you mean '" + near + "'?");
   }
   return pipeline;
-}
-
-}  // namespace
-
-std::vector<PipelineVariable> pipeline_variables(std::string_view text) {
-  return with_json_errors([&] { return read_variables(text); });
-}
-
-Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::string>& settings) {
-  return with_json_errors([&] { return read_pipeline(text, settings); });
 }
 
 }  // namespace osteo

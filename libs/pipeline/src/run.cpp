@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <chrono>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/pipeline/formats.h"
 #include "osteo/pipeline/pipeline.h"
 #include "osteo/pipeline/report_json.h"
@@ -14,8 +14,6 @@ namespace osteo {
 extern const char* const kCommit;  // made at build time, see version.cmake
 
 namespace {
-
-using nlohmann::ordered_json;
 
 const Port* find_port(const std::vector<Port>& ports, const std::string& name) {
   for (const Port& p : ports) {
@@ -159,10 +157,11 @@ class Runner {
     for (const auto& [port, path] : pipeline_.nodes[n].outputs) {
       if (!fs::exists(path) || !fs::exists(provenance_path(path))) return false;
       try {
-        const auto p = ordered_json::parse(read_text(provenance_path(path)));
-        if (p.value("key", "") != result.key || p.value("output_hash", "") != hash_path(path)) return false;
-        result.output_hashes[port] = p.value("output_hash", "");
-        result.report = report_from_json(p.at("report"));
+        const JsonFile p(read_text(provenance_path(path)), provenance_path(path).string(), ExitCode::corrupt);
+        const auto text = [&](const char* key) { return p.text(p.need(p.root(), "", key), key); };
+        if (text("key") != result.key || text("output_hash") != hash_path(path)) return false;
+        result.output_hashes[port] = text("output_hash");
+        result.report = report_from_json(p.need(p.root(), "", "report"));
       } catch (const std::exception&) {
         return false;  // an unreadable record is no record
       }
@@ -252,13 +251,13 @@ class Runner {
   void save_provenance(std::size_t n, const std::string& port, const fs::path& path, const Context& context) {
     NodeResult& result = results_[n];
     result.output_hashes[port] = hash_path(path);
-    ordered_json p;
+    Json p;
     p["osteotome"] = std::string(program_version());
     p["stage"] = result.stage;
     p["version"] = stages_[n]->info().version;
     p["output"] = port;
     p["params"] = result.params;
-    ordered_json inputs = ordered_json::object();
+    Json inputs = Json::object();
     for (const auto& [name, input] : pipeline_.nodes[n].inputs) {
       inputs[name] = input.node.empty() ? file_hashes_.at(input.file.string()) : results_[index_.at(input.node)].key;
     }
@@ -369,9 +368,12 @@ void require_replaceable(const fs::path& folder, const fs::path& output) {
   std::map<std::string, std::string> ours;
   bool whole = false;
   try {
-    const auto p = ordered_json::parse(read_text(provenance_path(output)));
-    if (p.contains("files")) p["files"].get_to(ours);
-    whole = ours.empty() && p.value("output_hash", "") == hash_path(folder);
+    const JsonFile p(read_text(provenance_path(output)), provenance_path(output).string(), ExitCode::corrupt);
+    if (const JsonValue* const files = p.root().find("files"); files != nullptr) {
+      for (const auto& [name, hash] : files->members) ours[name] = p.text(hash, name);
+    }
+    const JsonValue* const hash = p.root().find("output_hash");
+    whole = ours.empty() && hash != nullptr && hash->text == hash_path(folder);
   } catch (const std::exception&) {
     // An unreadable record is no record.
   }

@@ -7,38 +7,49 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/base/json_document.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/pipeline/report_json.h"
 
 namespace osteo {
 namespace {
 
-using nlohmann::ordered_json;
-
-ordered_json triple(Vec3 v) {
+Json triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
 constexpr const char* kNext = ".osteo-next";          // complete, being moved to its places
 constexpr const char* kStaging = ".osteo-tmp-case-";  // in the making, or dead
 
-// Empty when there is none.
-ordered_json manifest_of(const fs::path& folder) {
+// An object without members when there is none, or it cannot be read.
+JsonValue manifest_of(const fs::path& folder) {
   const fs::path file = folder / "manifest.json";
-  if (!output_exists(file)) return ordered_json::object();
+  if (!output_exists(file)) return {};
   try {
-    auto m = ordered_json::parse(read_text(file), nullptr, false);
-    if (m.is_object() && m.contains("osteotome_case")) return m;
+    const JsonFile m(read_text(file), file.string(), ExitCode::corrupt);
+    if (m.root().find("osteotome_case") != nullptr) return m.root();
   } catch (const Error&) {
     // What cannot be read is no manifest.
   }
-  return ordered_json::object();
+  return {};
+}
+
+// A text of an object; empty when there is none.
+std::string text_of(const JsonValue& object, std::string_view key) {
+  const JsonValue* const value = object.find(key);
+  return value == nullptr ? std::string() : value->text;
+}
+
+// The entries of the manifest's "files".
+const std::vector<JsonMember>& files_of(const JsonValue& manifest) {
+  static const std::vector<JsonMember> none;
+  const JsonValue* const files = manifest.find("files");
+  return files == nullptr ? none : files->members;
 }
 
 bool lies_in(const fs::path& path, const fs::path& folder) {
@@ -57,12 +68,12 @@ void settle(const fs::path& folder) {
   const fs::path next = folder / kNext;
   std::error_code ec;
   if (fs::exists(next / "manifest.json", ec)) {
-    const ordered_json before = manifest_of(folder), after = manifest_of(next);
+    const JsonValue before = manifest_of(folder), after = manifest_of(next);
     std::set<std::string> kept;
-    for (const auto& f : after.value("files", ordered_json::object())) kept.insert(f.value("file", ""));
-    for (const auto& f : before.value("files", ordered_json::object())) {
-      const fs::path stale = folder / f.value("file", "");
-      if (kept.contains(f.value("file", "")) || !fs::is_regular_file(stale, ec) || hash_path(stale) != f.value("hash", "")) continue;
+    for (const auto& [role, f] : files_of(after)) kept.insert(text_of(f, "file"));
+    for (const auto& [role, f] : files_of(before)) {
+      const fs::path stale = folder / text_of(f, "file");
+      if (kept.contains(text_of(f, "file")) || !fs::is_regular_file(stale, ec) || hash_path(stale) != text_of(f, "hash")) continue;
       fs::remove(stale, ec);
       fs::remove(provenance_path(stale), ec);
     }
@@ -131,12 +142,15 @@ fs::path CaseUpdate::place(const fs::path& output) const {
 }
 
 void CaseUpdate::commit(const std::string& manifest) {
-  const auto without_program = [](ordered_json j) {
-    j.erase("program");
-    return j;
-  };
-  const ordered_json before = manifest_of(folder_);
-  if (fs::is_empty(staging_) && !before.empty() && without_program(before) == without_program(ordered_json::parse(manifest))) return;
+  if (fs::is_empty(staging_)) {
+    const auto without_program = [](const std::string& text) {
+      std::optional<Json> j = Json::parse(text);
+      if (j) j->erase("program");
+      return j;
+    };
+    const auto before = output_exists(folder_ / "manifest.json") ? without_program(read_text(folder_ / "manifest.json")) : std::nullopt;
+    if (before && before == without_program(manifest)) return;
+  }
   write_file(staging_ / "manifest.json", manifest);
   move_over(staging_, folder_ / kNext);
   settle(folder_);
@@ -145,11 +159,11 @@ void CaseUpdate::commit(const std::string& manifest) {
 std::vector<std::string> foreign_files(const fs::path& folder, const std::vector<fs::path>& outputs) {
   std::vector<std::string> foreign;
   if (!output_exists(folder)) return foreign;
-  const ordered_json manifest = manifest_of(folder);
+  const JsonValue manifest = manifest_of(folder);
   std::set<std::string> ours;
-  if (!manifest.empty()) ours.insert("manifest.json");
-  for (const auto& f : manifest.value("files", ordered_json::object())) ours.insert(f.value("file", ""));
-  bool is_case = !manifest.empty();
+  bool is_case = !manifest.members.empty();
+  if (is_case) ours.insert("manifest.json");
+  for (const auto& [role, f] : files_of(manifest)) ours.insert(text_of(f, "file"));
   std::vector<std::string> all;
   try {
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -180,27 +194,29 @@ std::vector<std::string> foreign_files(const fs::path& folder, const std::vector
 }
 
 void recall_facts(const fs::path& folder, std::vector<NodeResult>& results) {
-  const ordered_json manifest = manifest_of(folder);
+  const JsonValue manifest = manifest_of(folder);
+  const JsonValue* const steps = manifest.find("steps");
+  if (steps == nullptr) return;
   for (NodeResult& r : results) {
     if (!r.reused || !r.report.empty()) continue;
-    for (const auto& step : manifest.value("steps", ordered_json::array())) {
-      if (step.value("id", "") == r.id && step.value("key", "") == r.key)
-        r.report = report_from_json(step.value("report", ordered_json::object()));
+    for (const JsonValue& step : steps->items) {
+      const JsonValue* const report = step.find("report");
+      if (report != nullptr && text_of(step, "id") == r.id && text_of(step, "key") == r.key) r.report = report_from_json(*report);
     }
   }
 }
 
 std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_name, const std::vector<NodeResult>& results,
                           const Recipe& recipe) {
-  ordered_json m;
+  Json m;
   m["osteotome_case"] = 1;
   m["program"] = std::string(program_version());
   m["pipeline"] = pipeline_name;
-  m["recipe"] = ordered_json::parse(recipe_json(recipe));
+  m["recipe"] = recipe_json(recipe);
   m["units"] = {{"length", "mm"}, {"world", "LPS"}, {"density", "share of the voxel filled with bone, 0 to 1"}, {"hu", "Hounsfield units"}};
   m["privacy"] = "No identity, no dates, no file names of the source. Only voxels that hold bone are stored: no skin, no face.";
-  m["files"] = ordered_json::object();
-  m["steps"] = ordered_json::array();
+  m["files"] = Json::object();
+  m["steps"] = Json::list();
   fs::path bone_file;
   for (const NodeResult& r : results) {
     m["steps"].push_back({{"id", r.id}, {"stage", r.stage}, {"params", r.params}, {"key", r.key}, {"report", report_to_json(r.report)}});
@@ -227,22 +243,27 @@ std::string make_manifest(const CaseUpdate& update, const std::string& pipeline_
   return m.dump(2) + "\n";
 }
 
-std::map<std::string, ManifestFile> parse_manifest(std::string_view json) {
+std::map<std::string, ManifestFile> parse_manifest(std::string_view json, const std::string& name) {
+  using Names = std::vector<std::string>;
   std::map<std::string, ManifestFile> files;
   try {
-    const ordered_json m = ordered_json::parse(json);
-    if (m.at("osteotome_case") != 1) throw Error(ExitCode::corrupt, "it is of an unknown version");
-    for (const auto& [role, f] : m.at("files").items()) {
-      ManifestFile file{f.at("file").get<std::string>(), f.at("hash").get<std::string>()};
-      if (file.name.empty() || file.name.find('/') != std::string::npos || file.name == "..") {
-        throw Error(ExitCode::corrupt, "it names a file outside the case");
-      }
+    const JsonFile m(json, name, ExitCode::corrupt);
+    m.require_format("osteotome_case");
+    m.allow(m.root(), "",
+            Names{"osteotome_case", "program", "pipeline", "recipe", "units", "privacy", "files", "steps", "frame", "bone_memory_mb"});
+    const JsonValue& listed = m.need(m.root(), "", "files");
+    if (listed.kind != JsonValue::Kind::object) throw m.wrong(listed, "\"files\" must be an object in braces");
+    for (const auto& [role, f] : listed.members) {
+      m.allow(f, role, Names{"file", "hash"});
+      ManifestFile file{m.text(m.need(f, role, "file"), role + ": \"file\""), m.text(m.need(f, role, "hash"), role + ": \"hash\"")};
+      if (file.name.empty() || file.name.find('/') != std::string::npos || file.name == "..")
+        throw m.wrong(f, role + ": '" + file.name + "' is no file inside the case");
       files[role] = std::move(file);
     }
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, std::string("it is damaged: ") + json_complaint(e), "run 'osteo prepare' again");
+    if (!files.contains("bone")) throw m.wrong(listed, "it names no bone");
+  } catch (const Error& e) {
+    throw e.advice().empty() ? Error(e.code(), e.what(), "run 'osteo prepare' again") : e;
   }
-  if (!files.contains("bone")) throw Error(ExitCode::corrupt, "it names no bone");
   return files;
 }
 
@@ -260,12 +281,7 @@ Case load_case(const fs::path& folder) {
   }
   Case result;
   result.folder = folder;
-  std::map<std::string, ManifestFile> files;
-  try {
-    files = parse_manifest(read_text(manifest));
-  } catch (const Error& e) {
-    throw e.in("'" + manifest.string() + "'");
-  }
+  const std::map<std::string, ManifestFile> files = parse_manifest(read_text(manifest), manifest.string());
   for (const auto& [role, f] : files) {
     const fs::path path = folder / f.name;
     require_readable(path);

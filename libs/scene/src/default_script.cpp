@@ -3,6 +3,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/scene/rehearsal.h"
 
 namespace osteo {
@@ -13,8 +14,7 @@ Script make_default_script(const World& world, bool left, int tool, double secon
   Vec3 sum{};
   double weight = 0;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-    const Ijk o = bone.brick_coordinate(b);
-    sum += bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
+    sum += middle_of_brick_mm(bone, b);
     weight += 1;
   }
   if (weight == 0) throw Error(ExitCode::failed, "the case holds no bone");

@@ -9,6 +9,7 @@
 
 #include "osteo/base/portable_math.h"
 #include "osteo/bone/instrument.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/haptics/haptic_scene.h"
 
 namespace osteo {
@@ -113,18 +114,14 @@ ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip) {
   return skin;
 }
 
-FreeWays::FreeWays(const World& world, ToolSkin tool) : tool_(std::move(tool)) {
+FreeWays::FreeWays(const World& world, ToolSkin tool, const StructureMap* structures) : tool_(std::move(tool)), structures_(structures) {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   for (const PlacedBody& placed : world.bodies()) {
     Bone b{placed.body, placed.world_from_body.inverse(), {}, 0};
     const BrickGrid& bone = placed.body->bone;
-    const auto middle = [&](std::uint32_t brick) {
-      const Ijk o = bone.brick_coordinate(brick);
-      return bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
-    };
     Vec3 own_lo{1e30, 1e30, 1e30}, own_hi{-1e30, -1e30, -1e30};
     for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
-      const Vec3 p = middle(brick);
+      const Vec3 p = middle_of_brick_mm(bone, brick);
       for (std::size_t a = 0; a < 3; ++a) {
         own_lo[a] = std::min(own_lo[a], p[a]);
         own_hi[a] = std::max(own_hi[a], p[a]);
@@ -133,7 +130,7 @@ FreeWays::FreeWays(const World& world, ToolSkin tool) : tool_(std::move(tool)) {
     if (bone.brick_count() == 0) continue;
     b.centre_mm = (own_lo + own_hi) * 0.5;
     for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick)
-      b.radius_mm = std::max(b.radius_mm, length(middle(brick) - b.centre_mm));
+      b.radius_mm = std::max(b.radius_mm, length(middle_of_brick_mm(bone, brick) - b.centre_mm));
     b.radius_mm += 4 * length(bone.frame().spacing_mm);
     const Vec3 at = placed.world_from_body(b.centre_mm);
     for (std::size_t a = 0; a < 3; ++a) {
@@ -148,8 +145,31 @@ FreeWays::FreeWays(const World& world, ToolSkin tool) : tool_(std::move(tool)) {
     radius_mm_ = std::max(radius_mm_, length(b.body_from_world.inverse()(b.centre_mm) - centre_mm_) + b.radius_mm);
 }
 
-// Points of the skin that are in bone, counted to one more than `most`.
+// Points of the skin that are in bone or too near to a structure, counted to one more than `most`.
 std::size_t FreeWays::touching(const HandPose& pose, double margin_mm, std::size_t most) const {
+  const std::size_t bone = touching_bone(pose, margin_mm, most);
+  if (bone > most || structures_ == nullptr) return bone;
+  return bone + touching_structures(pose, std::max(kClearOfStructuresMm, margin_mm), most - bone);
+}
+
+// A point that is far from all structures speaks for those beside it: distance grows no faster than one goes.
+std::size_t FreeWays::touching_structures(const HandPose& pose, double clear_mm, std::size_t most) const {
+  constexpr double kErrorMm = 0.2;  // of the map's distances
+  const RigidTransform hand{frame_of_axis(pose.axis), pose.at_mm};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < tool_.points.size();) {
+    const Vec3 here = tool_.points[i].at_mm;
+    const double distance = structures_->at(hand(here)).distance_mm;
+    if (distance < clear_mm && ++count > most) return count;
+    const double room = distance - clear_mm - kErrorMm;
+    do {
+      ++i;
+    } while (i < tool_.points.size() && length(tool_.points[i].at_mm - here) < room);
+  }
+  return count;
+}
+
+std::size_t FreeWays::touching_bone(const HandPose& pose, double margin_mm, std::size_t most) const {
   // With room to keep any bone counts; without it, what is more bone than not.
   const float least = margin_mm > 0 ? 0.05F : 0.5F;
   const RigidTransform hand{frame_of_axis(pose.axis), pose.at_mm};
@@ -196,10 +216,10 @@ bool FreeWays::free_leg(const HandPose& a, const HandPose& b, double margin_mm) 
   return true;
 }
 
-// The most room, of those that ways are looked for with.
+// The most room in bone, of those that ways are looked for with.
 double FreeWays::margin_at(const HandPose& pose) const {
   for (const double m : {kClearMm, 0.0}) {
-    if (free(pose, m)) return m;
+    if (touching_bone(pose, m, 0) == 0) return m;
   }
   return kPressedMm;
 }
@@ -372,17 +392,37 @@ std::optional<HandWay> FreeWays::finished(const HandPose& from, const Poses& pos
   return way;
 }
 
-HandWay FreeWays::way(const HandPose& from, const HandPose& to) const {
+// Clear of the structures, or where only they are in the way, past them.
+FreeWays::Found FreeWays::clear_or_past_structures(const auto& find) const {
+  const Found clear = find(*this);
+  if (!clear.way.put || structures_ == nullptr) return clear;
+  FreeWays of_bone(*this);
+  of_bone.structures_ = nullptr;
+  Found past = find(of_bone);
+  if (past.way.put) return clear;
+  past.past_structures = true;
+  return past;
+}
+
+FreeWays::Found FreeWays::way(const HandPose& from, const HandPose& to) const {
+  return clear_or_past_structures([&](const FreeWays& ways) { return ways.found_way(from, to); });
+}
+
+FreeWays::Found FreeWays::approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
+  return clear_or_past_structures([&](const FreeWays& ways) { return ways.found_approach(from, seen_mm, forward, axis); });
+}
+
+FreeWays::Found FreeWays::found_way(const HandPose& from, const HandPose& to) const {
   if (auto poses = way_out(from, normalized(to.at_mm - centre_mm_))) {
     if (const auto rest = across(poses->empty() ? from : poses->back(), to)) {
       poses->insert(poses->end(), rest->begin(), rest->end());
-      if (const auto way = finished(from, *poses)) return *way;
+      if (const auto way = finished(from, *poses)) return {*way, to};
     }
   }
-  return put_at(to);
+  return {put_at(to), to};
 }
 
-FreeWays::Approach FreeWays::approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
+FreeWays::Found FreeWays::found_approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const {
   constexpr double kGapMm = 0.5;
   const Vec3 back = forward * -1;
   // As asked; leaning as much to the other sides; towards who looks.

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/base/param.h"
 #include "osteo/bone/plate_fit.h"
 #include "osteo/bone/world_mesh.h"
@@ -15,20 +15,18 @@
 namespace osteo {
 namespace {
 
-using nlohmann::ordered_json;
-
-ordered_json matrix(const RigidTransform& t) {
-  ordered_json rows = ordered_json::array();
+Json matrix(const RigidTransform& t) {
+  Json rows = Json::list();
   for (std::size_t r = 0; r < 3; ++r)
     rows.push_back({t.rotation.column[0][r], t.rotation.column[1][r], t.rotation.column[2][r], t.shift_mm[r]});
   rows.push_back({0, 0, 0, 1});
   return rows;
 }
-ordered_json triple(Vec3 v) {
+Json triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
 
-ordered_json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
+Json gaps_of(const World& world, const Fixture& f, const fs::path& csv) {
   const PlateModel& plate = plate_library()[f.plate];
   const RigidTransform pose = pose_of(world, f);
   std::vector<double> gaps;
@@ -44,7 +42,7 @@ ordered_json gaps_of(const World& world, const Fixture& f, const fs::path& csv) 
     none += met ? 0 : 1;
   }
   write_file(csv, text);
-  ordered_json j;
+  Json j;
   j["points"] = gaps.size() + none;
   j["points_without_bone_within_5_mm"] = none;
   if (gaps.empty()) return j;
@@ -70,10 +68,10 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
   std::error_code ec;
   fs::create_directories(folder, ec);
   if (ec) throw Error(ExitCode::cannot_write, "cannot make the folder '" + folder.string() + "': " + ec.message());
-  ordered_json j;
+  Json j;
   j["osteotome_plan"] = 1;
   j["units"] = "mm, LPS; transforms take points of the case to where they are now";
-  j["pieces"] = ordered_json::array();
+  j["pieces"] = Json::list();
   constexpr double kWarnPercent = 0.1;
   const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
   double done = 0;
@@ -90,37 +88,38 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
     const double voxel = b.body->bone.frame().voxel_volume_mm3();
     const auto& parts = solid.components();
     const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& x, const auto& y) { return x.mass < y.mass; });
-    ordered_json piece{{"number", b.body->id},
-                       {"file", name},
-                       {"volume_mm3", surface.bone_mm3},
-                       {"surface_volume_mm3", surface.surface_mm3},
-                       {"surface_volume_off_percent", off_percent},
-                       {"surface_at_density", static_cast<double>(surface.iso)},
-                       {"surface_scaled_by", surface.scale},
-                       {"surface_moved_mm", surface.moved_mm},
-                       {"region_of_interest", b.of_region},
-                       {"transform", matrix(b.world_from_body)},
-                       {"shift_mm", triple(b.world_from_body.shift_mm)}};
+    Json piece{{"number", b.body->id},
+               {"file", name},
+               {"volume_mm3", surface.bone_mm3},
+               {"surface_volume_mm3", surface.surface_mm3},
+               {"surface_volume_off_percent", off_percent},
+               {"surface_at_density", static_cast<double>(surface.iso)},
+               {"surface_scaled_by", surface.scale},
+               {"surface_moved_mm", surface.moved_mm},
+               {"region_of_interest", b.of_region},
+               {"transform", matrix(b.world_from_body)},
+               {"shift_mm", triple(b.world_from_body.shift_mm)}};
     if (largest != parts.end()) {
       piece["centre_mm"] = triple(b.world_from_body(largest->centre_mm));
-      piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"] = ordered_json::array();
+      piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"] = Json::list();
       for (const double i : largest->inertia_mm2) piece["inertia_g_mm2_at_1_g_per_cm3_in_the_case"].push_back(i * voxel / 1000);
     }
     j["pieces"].push_back(piece);
   }
-  j["plates"] = ordered_json::array();
+  j["plates"] = Json::list();
   for (const Fixture& f : world.fixtures()) {
     context.progress(done++ / steps, "plates");
     const PlateModel& plate = plate_library()[f.plate];
     const std::string name = "plate-" + std::to_string(f.id);
     save_surface(plate_of(world, f), folder / (name + ".stl"));
     const RigidTransform pose = pose_of(world, f);
-    ordered_json screws = ordered_json::array();
+    Json screws = Json::list();
     for (const Vec3 h : plate.holes_mm) {
       const bool moves = plate.most_opening_mm > 0 && h.x > 0;
       screws.push_back(triple(pose(h + Vec3{moves ? f.opening_mm : 0, 0, 0})));
     }
-    ordered_json on = ordered_json::array({f.body});
+    Json on = Json::list();
+    on.push_back(f.body);
     if (f.other != SceneAction::kNobody) on.push_back(f.other);
     j["plates"].push_back({{"number", f.id},
                            {"plate", plate.name},

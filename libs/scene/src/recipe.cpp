@@ -1,15 +1,13 @@
 #include "osteo/scene/recipe.h"
 
 #include <cstdlib>
-#include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json.h"
 
 namespace osteo {
 namespace {
-
-using nlohmann::ordered_json;
 
 // Where notes are kept; empty without a home.
 fs::path notes_folder() {
@@ -54,11 +52,11 @@ std::optional<fs::path> recall_file(const std::string& hash) {
   return std::nullopt;
 }
 
-std::string recipe_json(const Recipe& r) {
-  ordered_json j{{"source_hash", r.source_hash}};
+Json recipe_json(const Recipe& r) {
+  Json j{{"source_hash", r.source_hash}};
   if (!r.structures_hash.empty()) j["structures_hash"] = r.structures_hash;
   if (!r.pipeline_hash.empty()) j["pipeline_hash"] = r.pipeline_hash;
-  j["settings"] = ordered_json::object();
+  j["settings"] = Json::object();
   for (const auto& [name, value] : r.settings) {
     if (r.withheld.contains(name)) {
       j["withheld"][name] = hash_text(value);
@@ -66,33 +64,41 @@ std::string recipe_json(const Recipe& r) {
       j["settings"][name] = value;
     }
   }
-  return j.dump();
+  return j;
 }
 
 std::optional<Recipe> read_recipe(const fs::path& case_folder) {
   const fs::path file = case_folder / "manifest.json";
   if (!output_exists(file)) return std::nullopt;
   try {
-    const auto m = ordered_json::parse(read_text(file));
-    if (!m.contains("recipe")) return std::nullopt;
-    const auto& j = m.at("recipe");
+    const JsonFile m(read_text(file), file.string(), ExitCode::corrupt);
+    const JsonValue* const j = m.root().find("recipe");
+    if (j == nullptr) return std::nullopt;
+    m.allow(*j, "recipe", std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "settings", "withheld"});
+    const auto text = [&](const char* key) {
+      const JsonValue* const value = j->find(key);
+      return value == nullptr ? std::string() : m.text(*value, std::string("recipe: \"") + key + "\"");
+    };
+    const auto each = [&](const JsonValue* object, const auto& take) {
+      if (object == nullptr) return;
+      for (const auto& [name, value] : object->members) take(name, m.text(value, "recipe: \"" + name + "\""));
+    };
     Recipe r;
-    r.source_hash = j.at("source_hash").get<std::string>();
-    r.structures_hash = j.value("structures_hash", "");
-    r.pipeline_hash = j.value("pipeline_hash", "");
-    for (const auto& [name, value] : j.at("settings").items()) r.settings[name] = value.get<std::string>();
-    const auto withheld = j.value("withheld", ordered_json::object());
-    for (const auto& [name, hash] : withheld.items()) {
-      if (const auto value = recall(hash.get<std::string>())) {
+    r.source_hash = m.text(m.need(*j, "recipe", "source_hash"), "recipe: \"source_hash\"");
+    r.structures_hash = text("structures_hash");
+    r.pipeline_hash = text("pipeline_hash");
+    each(&m.need(*j, "recipe", "settings"), [&](const std::string& name, const std::string& value) { r.settings[name] = value; });
+    each(j->find("withheld"), [&](const std::string& name, const std::string& hash) {
+      if (const auto value = recall(hash)) {
         r.settings[name] = *value;
         r.withheld.insert(name);
       } else {
         r.lost.insert(name);
       }
-    }
+    });
     return r;
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + e.what(), "make the case anew, with --fresh and all its flags");
+  } catch (const Error& e) {
+    throw Error(e.code(), e.what(), "make the case anew, with --fresh and all its flags");
   }
 }
 

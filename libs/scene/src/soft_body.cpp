@@ -12,6 +12,7 @@
 #include "osteo/tets/skin.h"
 #include "osteo/tissue/dynamics.h"
 #include "osteo/tissue/problem.h"
+#include "osteo/tissue/voxel_cutting.h"
 #include "rigid_shapes.h"
 
 namespace osteo {
@@ -38,7 +39,7 @@ struct SoftBody::Impl {
   TetMesh mesh;  // what is left of it; its points at rest
   TissueModel model;
   TissueDynamics<float> dynamics;
-  std::vector<bool> gone;  // of the model's tetrahedra
+  VoxelCutting cutting;
   // What is drawn: triangles over points of the skin (if there is one), then over points of the body.
   std::optional<Skin> skin;
   std::size_t skin_points = 0;
@@ -47,7 +48,6 @@ struct SoftBody::Impl {
   TriMesh whole_skin;                                     // with all its triangles
   std::set<std::array<std::uint32_t, 3>> whole_boundary;  // faces outside before anything was cut; with a skin only
   std::uint64_t version = 1;
-  double voxel_mm3 = 0, budget_mm3 = 0, cut_mm3 = 0;
   int steps = 1;
   bool pushed = false;
 
@@ -55,8 +55,7 @@ struct SoftBody::Impl {
       : mesh(of),
         model(std::move(m)),
         dynamics(model, problem.fixed, {.density_kg_m3 = 1000, .damping_per_s = kDampingPerS, .step_share = kStepShare}, problem.sliders),
-        gone(model.tets().size()) {
-    voxel_mm3 = volume_mm3(mesh) / (static_cast<double>(model.tets().size()) / 5);
+        cutting(model, volume_mm3(mesh) / (static_cast<double>(model.tets().size()) / 5)) {
     if (finer != nullptr) {
       skin.emplace(*finer, mesh);
       skin_points = finer->points_mm.size();
@@ -84,61 +83,15 @@ struct SoftBody::Impl {
     return faces;
   }
 
-  void cut(const SoftTool& tool, double force_n);
   void lay_surface();
 };
-
-// By force and time; the voxel whose corners lie deepest in the burr goes first.
-void SoftBody::Impl::cut(const SoftTool& tool, double force_n) {
-  const Burr* const burr = instrument_of(tool.tool).as_burr();
-  if (burr == nullptr) return;
-  budget_mm3 += std::min(force_n * burr->rate_mm3_per_s_per_n * kEasierThanBone, kMostMm3PerS) / kUpdatesPerS;
-  budget_mm3 = std::min(budget_mm3, 8 * voxel_mm3);
-  if (budget_mm3 < voxel_mm3) return;
-  const ToolShape shape(burr->head(), tool.at_mm, tool.axis);
-  const auto x = dynamics.positions_mm();
-  const RigidShape::Ball near = shape.bounds();
-  std::vector<std::pair<double, std::uint32_t>> met;  // depth, voxel
-  for (std::uint32_t v = 0; v < model.tets().size() / 5; ++v) {
-    if (gone[5 * v]) continue;
-    double deepest = 0;
-    for (std::uint32_t t = 5 * v; t < 5 * v + 5; ++t) {
-      for (const std::uint32_t p : model.tets()[t]) {
-        const Vec3 off = x[p] - near.centre_mm;
-        if (dot(off, off) > near.radius_mm * near.radius_mm) continue;
-        Vec3 out;
-        deepest = std::min(deepest, shape.distance_mm(x[p], out));
-      }
-    }
-    if (deepest < 0) met.push_back({deepest, v});
-  }
-  std::sort(met.begin(), met.end());
-  std::vector<std::uint32_t> tets;
-  for (const auto& [depth, v] : met) {
-    if (budget_mm3 < voxel_mm3) break;
-    budget_mm3 -= voxel_mm3;
-    cut_mm3 += voxel_mm3;
-    for (std::uint32_t t = 5 * v; t < 5 * v + 5; ++t) {
-      tets.push_back(t);
-      gone[t] = true;
-    }
-  }
-  if (tets.empty()) return;
-  dynamics.cut_off(tets);
-  // What comes loose with it is taken to be sucked away.
-  tets = dynamics.loose();
-  for (const std::uint32_t t : tets) gone[t] = true;
-  cut_mm3 += voxel_mm3 * static_cast<double>(tets.size()) / 5;
-  dynamics.cut_off(tets);
-  lay_surface();
-}
 
 void SoftBody::Impl::lay_surface() {
   ++version;
   mesh.tets.clear();
   std::set<std::array<std::uint32_t, 4>> left;
-  for (std::size_t t = 0; t < gone.size(); ++t) {
-    if (gone[t]) continue;
+  for (std::size_t t = 0; t < cutting.gone().size(); ++t) {
+    if (cutting.gone()[t]) continue;
     mesh.tets.push_back(model.tets()[t]);
     if (skin) left.insert(sorted(model.tets()[t]));
   }
@@ -176,12 +129,16 @@ void SoftBody::meet(const World* world) {
 
 std::optional<SceneAction> SoftBody::update(const SoftTool& tool) {
   Impl& m = *impl_;
-  m.dynamics.set_tool({std::make_shared<ToolShape>(instrument_of(tool.tool).head, tool.at_mm, tool.axis), kToolStiffness});
+  const Instrument& held = instrument_of(tool.tool);
+  const auto shape = std::make_shared<ToolShape>(held.head, tool.at_mm, tool.axis);
+  m.dynamics.set_tool({shape, kToolStiffness});
   const Vec3 force = m.dynamics.step(m.steps);
   const double size = length(force);
   const bool pushes = size > 1e-4;
   const double met = std::max(1, m.dynamics.met_by_tool());
-  if (tool.turns && pushes) m.cut(tool, size);
+  if (const Burr* const burr = held.as_burr(); burr != nullptr && tool.turns && pushes) {
+    if (m.cutting.cut(m.dynamics, *shape, VoxelCutting::rate_mm3_per_s(size, burr->rate_mm3_per_s_per_n) / kUpdatesPerS)) m.lay_surface();
+  }
   if (!pushes && !m.pushed) return std::nullopt;
   m.pushed = pushes;
   if (!pushes) return SceneAction::soft_push(tool.at_mm, {}, 0, 0);
@@ -206,7 +163,7 @@ std::uint64_t SoftBody::version() const {
   return impl_->version;
 }
 double SoftBody::cut_off_mm3() const {
-  return impl_->cut_mm3;
+  return impl_->cutting.cut_mm3();
 }
 double SoftBody::slow_motion() const {
   return std::min(1.0, impl_->steps * impl_->dynamics.step_s() * kUpdatesPerS);

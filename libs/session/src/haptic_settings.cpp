@@ -6,7 +6,7 @@
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
 #include "osteo/bone/hardness.h"
-#include "osteo/io/points_io.h"
+#include "osteo/data/points_io.h"
 
 namespace osteo {
 namespace {
@@ -93,7 +93,7 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
   if (!vibration_file.empty()) {
     const fs::path beside = path.parent_path() / vibration_file;
     setup.vibration_json = read_text(beside);
-    static_cast<void>(parse_vibration(setup.vibration_json, "'" + beside.string() + "'"));
+    static_cast<void>(parse_vibration(setup.vibration_json, beside.string()));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/base/json_document.h"
 #include "osteo/base/portable_math.h"
 #include "osteo/bone/instrument.h"
 #include "osteo/bone/plates.h"
@@ -495,7 +496,7 @@ ordered_json object_schema() {
   ordered_json s{
       {"type", "object"}, {"additionalProperties", false}, {"required", ordered_json::array()}, {"properties", ordered_json::object()}};
   for (const FieldRef& f : fields_in(part)) {
-    s["properties"][std::string(f.doc.name)] = ordered_json::parse(field_schema(f));
+    s["properties"][std::string(f.doc.name)] = ordered_json::parse(field_schema(f).dump());
     if (f.doc.needed) s["required"].push_back(f.doc.name);
   }
   return s;

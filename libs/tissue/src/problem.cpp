@@ -1,7 +1,6 @@
 #include "osteo/tissue/problem.h"
 
 #include <functional>
-#include <nlohmann/json.hpp>
 
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
@@ -11,181 +10,203 @@
 namespace osteo {
 namespace {
 
-using nlohmann::ordered_json;
+using Place = std::function<bool(Vec3)>;
+using Names = std::vector<std::string>;
 
-Vec3 vec(const ordered_json& j) {
-  return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+constexpr double kFarMm = 1e6;
+constexpr const char* kWhere = "places are LPS mm; mesh-info tells where the mesh is";
+
+Material material_of(const JsonFile& file, const JsonValue& at, const std::string& where) {
+  // Finite elements bear any ratio between -1 and a half; the fast model asks for more and says so itself.
+  return {file.number(file.need(at, where, "young_kpa"), where + ": \"young_kpa\"", 1e-6, 1e9) / 1000,
+          file.number(file.need(at, where, "poisson"), where + ": \"poisson\" (Poisson's ratio)", -0.999, 0.49999)};
 }
 
-std::function<bool(Vec3)> place(const ordered_json& j) {
-  if (j.contains("box_mm")) {
-    const Vec3 lo = vec(j.at("box_mm").at(0)), hi = vec(j.at("box_mm").at(1));
-    return [=](Vec3 p) { return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z; };
+// Reads a problem onto a mesh, part by part; every value is checked with its line.
+class ProblemReader {
+ public:
+  ProblemReader(std::string_view json, const TetMesh& mesh) : file_(json, "tissue problem"), mesh_(mesh), held_(mesh.points_mm.size()) {}
+
+  TissueProblem read(bool needs_loads) {
+    const JsonValue& root = file_.root();
+    file_.require_format("osteotome_tissue");
+    file_.allow(root, "", Names{"osteotome_tissue", "$schema", "about", "material", "regions", "fixed", "loads"});
+    const JsonValue& general = file_.need(root, "", "material");
+    file_.allow(general, "material", Names{"young_kpa", "poisson", "about"});
+    problem_.general = material_of(file_, general, "material");
+    const auto& regions = items(root, "regions", false);
+    problem_.materials.assign(regions.empty() ? 1 : mesh_.tets.size(), problem_.general);
+    each(regions, "region", [&](const JsonValue& r, const std::string& where) { read_region(r, where); });
+    each(items(root, "fixed", true), "fixed", [&](const JsonValue& f, const std::string& where) { read_fixed(f, where); });
+    const auto& loads = items(root, "loads", needs_loads);
+    if (needs_loads && loads.empty()) throw file_.wrong(file_.need(root, "", "loads"), "\"loads\": there is none");
+    each(loads, "load", [&](const JsonValue& l, const std::string& where) { read_load(l, where); });
+    return std::move(problem_);
   }
-  const Vec3 at = vec(j.at("at_mm"));
-  const double r = j.at("radius_mm");
-  return [=](Vec3 p) { return length(p - at) <= r; };
-}
 
-Material material(const ordered_json& j) {
-  return {j.at("young_kpa").get<double>() / 1000, j.at("poisson").get<double>()};
-}
+ private:
+  [[nodiscard]] const std::vector<JsonValue>& items(const JsonValue& object, const std::string& key, bool needed) const {
+    static const std::vector<JsonValue> none;
+    const JsonValue* const found = needed ? &file_.need(object, "", key) : object.find(key);
+    return found == nullptr ? none : file_.list(*found, "\"" + key + "\"");
+  }
+  static void each(const std::vector<JsonValue>& list, const std::string& where, const auto& f) {
+    for (std::size_t n = 0; n < list.size(); ++n) f(list[n], where + " " + std::to_string(n + 1));
+  }
 
-// A key that is not known would be left out in silence.
-void allow_known_keys(const JsonFile& file) {
-  const auto each = [&](const JsonValue& object, const char* key, const std::string& where, auto&& f) {
-    const JsonValue* const list = object.find(key);
-    for (std::size_t n = 0; list != nullptr && n < list->items.size(); ++n) f(list->items[n], where + " " + std::to_string(n + 1));
-  };
-  using Keys = std::vector<std::string>;
-  const auto at_a_place = [&](Keys keys) {
-    return [&file, keys = std::move(keys)](const JsonValue& v, const std::string& where) mutable {
-      Keys all{"name", "about", "box_mm", "at_mm", "radius_mm"};
-      all.insert(all.end(), keys.begin(), keys.end());
-      file.allow(v, where, all);
-    };
-  };
-  const JsonValue& root = file.root();
-  file.allow(root, "", Keys{"osteotome_tissue", "$schema", "about", "material", "regions", "fixed", "loads"});
-  if (const JsonValue* const m = root.find("material")) file.allow(*m, "material", Keys{"young_kpa", "poisson"});
-  each(root, "regions", "region", at_a_place({"young_kpa", "poisson"}));
-  each(root, "fixed", "fixed", at_a_place({"axes"}));
-  each(root, "loads", "load", [&](const JsonValue& l, const std::string& where) {
-    file.allow(l, where, Keys{"name", "about", "forces", "surfaces"});
-    each(l, "forces", where + ", force", at_a_place({"total_n"}));
-    each(l, "surfaces", where + ", surface", at_a_place({"kpa"}));
-  });
-}
+  [[nodiscard]] Vec3 triple(const JsonValue& v, const std::string& called, double most) const {
+    const auto& c = file_.list(v, called, 3);
+    return {file_.number(c[0], called, -most, most), file_.number(c[1], called, -most, most), file_.number(c[2], called, -most, most)};
+  }
+
+  // A box or a ball; beside it the keys `others`.
+  [[nodiscard]] Place place(const JsonValue& v, const std::string& where, const Names& others) const {
+    Names known{"name", "about", "box_mm", "at_mm", "radius_mm"};
+    known.insert(known.end(), others.begin(), others.end());
+    file_.allow(v, where, known);
+    const JsonValue *const box = v.find("box_mm"), *const at = v.find("at_mm"), *const radius = v.find("radius_mm");
+    if ((box != nullptr) == (at != nullptr) || (at != nullptr) != (radius != nullptr))
+      throw file_.wrong(v, where + ": it needs a place: \"box_mm\", or \"at_mm\" with \"radius_mm\"", kWhere);
+    if (box != nullptr) {
+      const auto& corners = file_.list(*box, where + ": \"box_mm\"", 2);
+      const Vec3 lo = triple(corners[0], where + ": \"box_mm\"", kFarMm), hi = triple(corners[1], where + ": \"box_mm\"", kFarMm);
+      if (lo.x > hi.x || lo.y > hi.y || lo.z > hi.z)
+        throw file_.wrong(*box, where + ": \"box_mm\" must be its lower corner, then its upper");
+      return [=](Vec3 p) { return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z; };
+    }
+    const Vec3 centre = triple(*at, where + ": \"at_mm\"", kFarMm);
+    const double r = file_.number(*radius, where + ": \"radius_mm\"", 1e-6, kFarMm);
+    return [=](Vec3 p) { return length(p - centre) <= r; };
+  }
+
+  void read_region(const JsonValue& r, const std::string& where) {
+    const Place in = place(r, where, {"young_kpa", "poisson"});
+    const Material m = material_of(file_, r, where);
+    std::size_t hit = 0;
+    for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
+      Vec3 middle{};
+      for (const std::uint32_t p : mesh_.tets[t]) middle += from_floats(mesh_.points_mm[p]) / 4;
+      if (!in(middle)) continue;
+      problem_.materials[t] = m;
+      ++hit;
+    }
+    if (hit == 0) throw file_.wrong(r, where + ": no tetrahedron lies in it", kWhere);
+  }
+
+  void read_fixed(const JsonValue& f, const std::string& where) {
+    const Place in = place(f, where, {"axes"});
+    std::uint8_t axes = 7;
+    if (const JsonValue* const given = f.find("axes"); given != nullptr) {
+      axes = 0;
+      for (const char c : file_.text(*given, where + ": \"axes\"")) {
+        if (c < 'x' || c > 'z') throw file_.wrong(*given, where + ": \"axes\" are made of x, y and z, not '" + std::string(1, c) + "'");
+        axes = static_cast<std::uint8_t>(axes | 1 << (c - 'x'));
+      }
+      if (axes == 0) throw file_.wrong(*given, where + ": \"axes\" names none", "leave it out to hold all three");
+    }
+    std::size_t hit = 0;
+    for (std::uint32_t p = 0; p < held_.size(); ++p) {
+      if (!in(from_floats(mesh_.points_mm[p]))) continue;
+      ++hit;
+      if (axes != 7) {
+        problem_.sliders.push_back({p, axes});
+        continue;
+      }
+      if (!held_[p]) problem_.fixed.push_back(p);
+      held_[p] = true;
+    }
+    if (hit == 0) throw file_.wrong(f, where + ": no point lies in it", kWhere);
+  }
+
+  void read_load(const JsonValue& l, const std::string& where) {
+    file_.allow(l, where, Names{"name", "about", "forces", "surfaces"});
+    if (l.find("forces") == nullptr && l.find("surfaces") == nullptr)
+      throw file_.wrong(l, where + ": it has neither \"forces\" nor \"surfaces\"");
+    TissueLoad load;
+    load.fixed = problem_.fixed;
+    load.sliders = problem_.sliders;
+    each(items(l, "surfaces", false), where + ", surface", [&](const JsonValue& s, const std::string& at) { add_surface(load, s, at); });
+    each(items(l, "forces", false), where + ", force", [&](const JsonValue& f, const std::string& at) { add_force(load, f, at); });
+    const JsonValue* const name = l.find("name");
+    problem_.load_names.push_back(name != nullptr ? file_.text(*name, where + ": \"name\"") : where);
+    problem_.loads.push_back(std::move(load));
+  }
+
+  void add_surface(TissueLoad& load, const JsonValue& s, const std::string& where) {
+    constexpr double kMostKpa = 1e6;
+    if (boundary_.triangles.empty()) boundary_ = boundary_of(mesh_, &point_of_);
+    const Place in = place(s, where, {"kpa"});
+    const JsonValue& kpa = file_.need(s, where, "kpa");
+    const bool directed = kpa.kind == JsonValue::Kind::list;
+    const Vec3 over_area = directed ? triple(kpa, where + ": \"kpa\"", kMostKpa) : Vec3{};
+    const double pressure = directed ? 0 : file_.number(kpa, where + ": \"kpa\"", -kMostKpa, kMostKpa);
+    std::size_t hit = 0;
+    for (const auto& t : boundary_.triangles) {
+      const Vec3 a = from_floats(boundary_.points_mm[t[0]]), b = from_floats(boundary_.points_mm[t[1]]),
+                 c = from_floats(boundary_.points_mm[t[2]]);
+      if (!in((a + b + c) / 3)) continue;
+      ++hit;
+      const Vec3 area = cross(b - a, c - a) * 0.5;  // outwards
+      load.add_on_face({point_of_[t[0]], point_of_[t[1]], point_of_[t[2]]},
+                       directed ? over_area * (length(area) / 1000) : area * (-pressure / 1000));
+    }
+    if (hit == 0) throw file_.wrong(s, where + ": no part of the body's surface lies where it is loaded", "make its place larger");
+  }
+
+  void add_force(TissueLoad& load, const JsonValue& f, const std::string& where) {
+    const Place in = place(f, where, {"total_n"});
+    const Vec3 total = triple(file_.need(f, where, "total_n"), where + ": \"total_n\"", 1e6);
+    std::vector<std::uint32_t> near;
+    for (std::uint32_t p = 0; p < held_.size(); ++p) {
+      if (!held_[p] && in(from_floats(mesh_.points_mm[p]))) near.push_back(p);
+    }
+    if (near.empty()) throw file_.wrong(f, where + ": no point that can move lies where a force acts", "make its place larger");
+    for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
+  }
+
+  const JsonFile file_;
+  const TetMesh& mesh_;
+  TissueProblem problem_;
+  std::vector<bool> held_;  // along all axes
+  TriMesh boundary_;        // made when a surface is loaded
+  std::vector<std::uint32_t> point_of_;
+};
 
 }  // namespace
 
 TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads) {
   if (const std::size_t first = json.find_first_not_of(" \t\r\n"); first != std::string_view::npos && json[first] == '*')
     return tissue::problem_of_inp(json, mesh, needs_loads);
-  TissueProblem problem;
-  allow_known_keys(JsonFile(json, "tissue problem"));
-  std::string where = "header";
-  const auto refuse = [&](const std::string& what, const std::string& advice = {}) {
-    return Error(ExitCode::usage, "the tissue problem, " + where + ": " + what, advice);
-  };
-  try {
-    const auto j = ordered_json::parse(json, nullptr, true, true);
-    if (j.at("osteotome_tissue") != 1) throw refuse("\"osteotome_tissue\" must be 1");
-    where = "material";
-    const Material general = problem.general = material(j.at("material"));
-    const auto regions = j.value("regions", ordered_json::array());
-    problem.materials.assign(regions.empty() ? 1 : mesh.tets.size(), general);
-    int number = 0;
-    for (const auto& r : regions) {
-      where = "region " + std::to_string(++number);
-      const auto in = place(r);
-      const Material m = material(r);
-      std::size_t hit = 0;
-      for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        Vec3 middle{};
-        for (const std::uint32_t p : mesh.tets[t]) middle += from_floats(mesh.points_mm[p]) / 4;
-        if (!in(middle)) continue;
-        problem.materials[t] = m;
-        ++hit;
-      }
-      if (hit == 0) throw refuse("no tetrahedron lies in it", "places are LPS mm; mesh-info tells where the mesh is");
-    }
-    std::vector<bool> fixed(mesh.points_mm.size());
-    number = 0;
-    for (const auto& f : j.at("fixed")) {
-      where = "fixed " + std::to_string(++number);
-      const auto in = place(f);
-      std::uint8_t axes = 0;
-      for (const char c : f.value("axes", std::string("xyz"))) {
-        if (c < 'x' || c > 'z') throw refuse("\"axes\" are made of x, y and z, not '" + std::string(1, c) + "'");
-        axes = static_cast<std::uint8_t>(axes | 1 << (c - 'x'));
-      }
-      std::size_t hit = 0;
-      for (std::uint32_t p = 0; p < fixed.size(); ++p) {
-        if (!in(from_floats(mesh.points_mm[p]))) continue;
-        ++hit;
-        if (axes != 7) {
-          problem.sliders.push_back({p, axes});
-          continue;
-        }
-        if (!fixed[p]) problem.fixed.push_back(p);
-        fixed[p] = true;
-      }
-      if (hit == 0) throw refuse("no point lies in it", "places are LPS mm; mesh-info tells where the mesh is");
-    }
-    number = 0;
-    TriMesh boundary;
-    std::vector<std::uint32_t> point_of;
-    for (const auto& l : needs_loads ? j.at("loads") : j.value("loads", ordered_json::array())) {
-      where = "load " + std::to_string(++number);
-      TissueLoad load;
-      load.fixed = problem.fixed;
-      load.sliders = problem.sliders;
-      if (!l.contains("forces") && !l.contains("surfaces")) throw refuse("it has neither \"forces\" nor \"surfaces\"");
-      for (const auto& f : l.value("surfaces", ordered_json::array())) {
-        if (boundary.triangles.empty()) boundary = boundary_of(mesh, &point_of);
-        const auto in = place(f);
-        const auto& kpa = f.at("kpa");
-        std::size_t hit = 0;
-        for (const auto& t : boundary.triangles) {
-          const Vec3 a = from_floats(boundary.points_mm[t[0]]), b = from_floats(boundary.points_mm[t[1]]),
-                     c = from_floats(boundary.points_mm[t[2]]);
-          if (!in((a + b + c) / 3)) continue;
-          ++hit;
-          const Vec3 area = cross(b - a, c - a) * 0.5;  // outwards
-          load.add_on_face({point_of[t[0]], point_of[t[1]], point_of[t[2]]},
-                           kpa.is_array() ? vec(kpa) * (length(area) / 1000) : area * (-kpa.get<double>() / 1000));
-        }
-        if (hit == 0) throw refuse("no part of the body's surface lies where it is loaded", "make its place larger");
-      }
-      for (const auto& f : l.value("forces", ordered_json::array())) {
-        const auto in = place(f);
-        const Vec3 total = vec(f.at("total_n"));
-        std::vector<std::uint32_t> near;
-        for (std::uint32_t p = 0; p < fixed.size(); ++p) {
-          if (!fixed[p] && in(from_floats(mesh.points_mm[p]))) near.push_back(p);
-        }
-        if (near.empty()) throw refuse("no point that can move lies where a force acts", "make its place larger");
-        for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
-      }
-      problem.load_names.push_back(l.value("name", "load " + std::to_string(number)));
-      problem.loads.push_back(std::move(load));
-    }
-    where = "loads";
-    if (needs_loads && problem.loads.empty()) throw refuse("there is none");
-  } catch (const nlohmann::json::exception& e) {
-    throw refuse(json_complaint(e), "docs/tissue.md describes the file");
-  }
-  return problem;
+  return ProblemReader(json, mesh).read(needs_loads);
 }
 
 TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, const std::optional<std::string>& constants_json) {
-  const auto constants = [&]() -> std::optional<ordered_json> {
-    if (!constants_json) return std::nullopt;
-    try {
-      auto j = ordered_json::parse(*constants_json);
-      if (j.at("osteotome_tissue_constants") != 1) throw Error(ExitCode::usage, "these are no constants of calibrate");
-      return j;
-    } catch (const nlohmann::json::exception& e) {
-      throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + json_complaint(e));
-    }
-  }();
+  std::optional<JsonFile> constants;
+  if (constants_json) {
+    constants.emplace(*constants_json, "constants of calibrate");
+    constants->require_format("osteotome_tissue_constants");
+  }
   // One material a voxel, from those of its tetrahedra.
   std::vector<Material> materials;
   const std::size_t step = problem.materials.size() == 1 ? 1 : 5;
   for (std::size_t t = 0; t < problem.materials.size(); t += step) materials.push_back(problem.materials[t]);
-  if (constants && constants->contains("base")) materials.assign(1, material(constants->at("base")));
+  if (constants) {
+    if (const JsonValue* const base = constants->root().find("base"); base != nullptr)
+      materials.assign(1, material_of(*constants, *base, "base"));
+  }
   TissueModel model = TissueModel::of_voxels(points_of(mesh), tets_of(mesh), materials);
   if (!constants) {
     model.scale({1, 1, 0, 1});
     return model;
   }
-  try {
-    return with_log_factors(model, constants->at("grid").get<std::array<int, 3>>(),
-                            constants->at("log_factors").get<std::vector<double>>());
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(ExitCode::usage, std::string("these are no constants of calibrate: ") + json_complaint(e));
-  }
+  const JsonValue& root = constants->root();
+  std::array<int, 3> grid{};
+  const auto& sizes = constants->list(constants->need(root, "", "grid"), "\"grid\"", 3);
+  for (std::size_t a = 0; a < 3; ++a) grid[a] = static_cast<int>(constants->number(sizes[a], "\"grid\"", 1, 1000));
+  std::vector<double> log_factors;
+  for (const JsonValue& f : constants->list(constants->need(root, "", "log_factors"), "\"log_factors\""))
+    log_factors.push_back(constants->number(f, "\"log_factors\"", -100, 100));
+  return with_log_factors(model, grid, log_factors);
 }
 
 }  // namespace osteo

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <new>
 
+#include "osteo/grid/brick_places.h"
 #include "osteo/base/error.h"
 
 namespace osteo {
@@ -30,8 +31,7 @@ void RehearsalControl::measure(const World& world) {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
   const BrickGrid& bone = world.bodies().front().body->bone;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
-    const Ijk o = bone.brick_coordinate(b);
-    const Vec3 p = bone.frame().world_from_index({o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5});
+    const Vec3 p = middle_of_brick_mm(bone, b);
     for (std::size_t a = 0; a < 3; ++a) {
       lo[a] = std::min(lo[a], p[a]);
       hi[a] = std::max(hi[a], p[a]);
@@ -109,7 +109,7 @@ FreeWays RehearsalControl::free_ways(bool whole_tool) const {
   ToolSkin skin =
       plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip()) : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
   std::optional<FreeWays> ways;
-  rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin)); });
+  rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
 }
 
@@ -176,6 +176,9 @@ void RehearsalControl::bring(Vec3 direction) {
   lead(hit->at_mm, direction);
 }
 
+// No way was free of structures at risk.
+static constexpr const char* kPastStructures = "; past a structure at risk, since no other way was free";
+
 void RehearsalControl::go_on_leading() {
   if (!leading_) return;
   Device& device = rehearsal().device();
@@ -197,19 +200,21 @@ void RehearsalControl::go_on_leading() {
     const FreeWays ways = free_ways(true);
     const HandPose from = hand_pose();
     if (leading_->seen_mm) {
-      const FreeWays::Approach a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
+      const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
       char far[80];
       std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
       leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there"
                        : gap > 6 ? far
                                  : "drill brought to the bone";
+      if (a.past_structures) leading_->done += kPastStructures;
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {
       const HandPose to = waiting(ways);
-      const HandWay way = ways.way(from, to);
-      leading_->done = way.put ? "the drill was shut in; it was taken out" : "drill lifted out";
-      go(Leading::Stage::on_the_way, way, to);
+      const FreeWays::Found out = ways.way(from, to);
+      leading_->done = out.way.put ? "the drill was shut in; it was taken out" : "drill lifted out";
+      if (out.past_structures) leading_->done += kPastStructures;
+      go(Leading::Stage::on_the_way, out.way, to);
     }
   } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
     leading_->done = "the drill was stuck; it was taken out";

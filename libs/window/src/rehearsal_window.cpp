@@ -33,6 +33,7 @@
 #include "gamepad.h"
 #include "help_panel.h"
 #include "osteo/base/error.h"
+#include "osteo/grid/brick_places.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"

@@ -2,7 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "osteo/base/json_document.h"
 
 namespace osteo {
 namespace {
@@ -139,9 +146,88 @@ TEST(Json, FieldsAreReadStrictly) {
 TEST(Json, SchemaOfAFieldSaysWhatReadingChecks) {
   Part p;
   const auto fields = fields_of<Part>(p);
-  EXPECT_EQ(field_schema(fields[0]), R"({"type":"number","minimum":0.1,"maximum":2.0,"default":0.5,"description":"how wide [mm]"})");
-  EXPECT_EQ(field_schema(fields[4]), R"({"type":"array","items":{"type":"number"},"minItems":3,"maxItems":3,"description":"where [mm]"})");
-  EXPECT_EQ(field_schema(fields[6]), R"({"enum":["red","green"],"default":"red","description":"of it"})");
+  EXPECT_EQ(field_schema(fields[0]).dump(), R"({"type":"number","minimum":0.1,"maximum":2.0,"default":0.5,"description":"how wide [mm]"})");
+  EXPECT_EQ(field_schema(fields[4]).dump(),
+            R"({"type":"array","items":{"type":"number"},"minItems":3,"maxItems":3,"description":"where [mm]"})");
+  EXPECT_EQ(field_schema(fields[6]).dump(), R"({"enum":["red","green"],"default":"red","description":"of it"})");
+}
+
+TEST(JsonFile, ReadsSingleValuesWithTheirPlace) {
+  const JsonFile file("{\"format\": 1,\n\"n\": 7,\n\"x\": 0.5,\n\"t\": \"word\",\n\"l\": [1, 2]}", "f.json", ExitCode::corrupt);
+  file.require_format("format");
+  const auto at = [&](const char* key) -> const JsonValue& { return file.need(file.root(), "", key); };
+  EXPECT_TRUE(at("n").whole);
+  EXPECT_FALSE(at("x").whole);
+  EXPECT_EQ(file.number(at("n"), "\"n\"", 0, 7), 7);
+  EXPECT_EQ(file.text(at("t"), "\"t\""), "word");
+  EXPECT_EQ(file.list(at("l"), "\"l\"", 2).size(), 2u);
+  const auto says = [](const std::string& what, auto&& read) {
+    try {
+      static_cast<void>(read());
+      ADD_FAILURE() << what;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::corrupt);
+      EXPECT_EQ(e.what(), what);
+    }
+  };
+  says("'f.json' line 2: \"n\" is 7 and must be from 0 to 6", [&] { return file.number(at("n"), "\"n\"", 0, 6); });
+  says("'f.json' line 2: \"n\" is 7 and must be at least 8", [&] { return file.number(at("n"), "\"n\"", 8); });
+  says("'f.json' line 4: \"t\" must be a number", [&] { return file.number(at("t"), "\"t\""); });
+  says("'f.json' line 3: \"x\" must be a text in quotes", [&] { return file.text(at("x"), "\"x\""); });
+  says("'f.json' line 5: \"l\" must have 3 items", [&] { return file.list(at("l"), "\"l\"", 3).size(); });
+  says("'f.json' line 1: here: \"z\" is missing", [&] { return file.need(file.root(), "here", "z").line; });
+  says("'f.json' line 1: \"other\": 1 is missing", [&] { return file.require_format("other"), 0; });
+  says("'f.json' line 2: \"n\" must be 1", [&] { return file.require_format("n"), 0; });
+}
+
+TEST(JsonDocument, BracesMakeWhatTheyLookLike) {
+  Json j{{"whole", 1}, {"number", 1.0}, {"text", "a\"b"}, {"list", {1, 2.5, "x"}}, {"pairs", {{"a", 1}, {"b", false}}}};
+  j["more"]["deep"] = {"one"};
+  j["steps"].push_back({{"id", "ct"}});
+  j["steps"].back()["done"] = true;
+  j["null"];
+  j["empty"] = Json::list();
+  j["none"] = Json::object();
+  const std::map<std::string, int> map{{"z", 1}, {"a", 2}};
+  j["map"] = map;
+  j["array"] = std::array<double, 2>{0.1, 1e300};
+  j["texts"] = std::vector<std::string>{"p", "q"};
+  EXPECT_EQ(
+      j.dump(),
+      R"({"whole":1,"number":1.0,"text":"a\"b","list":[1,2.5,"x"],"pairs":{"a":1,"b":false},"more":{"deep":["one"]},)"
+      R"("steps":[{"id":"ct","done":true}],"null":null,"empty":[],"none":{},"map":{"a":2,"z":1},"array":[0.1,1e+300],"texts":["p","q"]})");
+  EXPECT_EQ(Json({{"a", {1, 2}}, {"b", Json::object()}}).dump(2), "{\n  \"a\": [\n    1,\n    2\n  ],\n  \"b\": {}\n}");
+  EXPECT_EQ(Json::parse(j.dump(1)).value(), j);
+  EXPECT_FALSE(Json::parse("{\"a\": }"));
+  j.erase("whole");
+  EXPECT_EQ(j.find("whole"), nullptr);
+  EXPECT_EQ(j.find("number")->number(), 1.0);
+  EXPECT_NE(Json(1), Json("1"));
+  EXPECT_EQ(Json(1), Json(1.0));
+}
+
+// The files of earlier versions stay the same to the byte: hashes of records depend on it.
+TEST(JsonDocument, NumbersAndTextsAreWrittenAsTheLibraryWritesThem) {
+  using nlohmann::ordered_json;
+  std::mt19937_64 random(5);
+  for (int n = 0; n < 200000; ++n) {
+    const std::uint64_t bits = random();
+    double d = 0;
+    std::memcpy(&d, &bits, sizeof d);
+    if (n % 2 == 0) d = std::ldexp(static_cast<double>(bits >> 20), -static_cast<int>(n % 60));
+    if (n % 5 == 0) d = std::round(d * 1e3) / 1e3;
+    ASSERT_EQ(Json(d).dump(), ordered_json(d).dump());
+    if (std::isfinite(d)) {
+      ASSERT_EQ(Json::parse(Json(d).dump())->number(), d);
+    }
+  }
+  for (const double d : {0.0, -0.0, 1.0, 1e15, 1e16, 1e-5, 123456789.0, 5e-324, std::nan(""), HUGE_VAL})
+    EXPECT_EQ(Json(d).dump(), ordered_json(d).dump());
+  EXPECT_EQ(Json(0.1F).dump(), ordered_json(0.1F).dump());
+  EXPECT_EQ(Json(std::uint64_t{18446744073709551615U}).dump(), "18446744073709551615");
+  EXPECT_EQ(Json(std::int64_t{-9223372036854775807}).dump(), "-9223372036854775807");
+  for (const char* text : {"", "plain", "a\tb\n\"\\", "\x01\x7f", "\u00e9\u20ac", "\xff broken \xc3"})
+    EXPECT_EQ(Json(text).dump(), ordered_json(text).dump(-1, ' ', false, ordered_json::error_handler_t::replace)) << text;
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "osteo/cli/command.h"
 #include "osteo/cli/report.h"
 #include "osteo/pipeline/pipeline.h"
-#include "stages.h"
+#include "osteo/stages/registry.h"
 
 namespace osteo {
 namespace {

@@ -3,18 +3,15 @@
 
 #include <unistd.h>
 
-#include <filesystem>
 #include <functional>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
-#include "osteo/dicom/save_series.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/grid/grid_io.h"
-#include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
+#include "osteo/grid/vdb.h"
 #include "osteo/image/threshold.h"
-#include "vdb.h"
 
 namespace osteo {
 namespace {
@@ -95,19 +92,6 @@ TEST(BrickLimits, ResampleSaysWhichVoxelsAreTooSmall) {
                  [&] { static_cast<void>(resample_bone(ct, mask, {.spacing_mm = 0.1, .lower = 300})); });
   expect_refused(ExitCode::resources, "voxels of 0.05 mm make a grid of more than",
                  [&] { static_cast<void>(resample_bone(ct, mask, {.spacing_mm = 0.05, .lower = 300})); });
-}
-
-TEST(BrickLimits, ImportBoneRefusesBeforeItTakesMemory) {
-  const auto folder = fs::temp_directory_path() / ("osteo-limits-" + std::to_string(::getpid()));
-  Frame f;
-  f.dims = {16, 16, 10};
-  f.spacing_mm = {50, 50, 5};
-  const auto v = make_voxels<std::int16_t>(f.voxel_count());
-  std::fill_n(v.get(), f.voxel_count(), static_cast<std::int16_t>(1000));
-  save_dicom_series({f, v}, folder);
-  expect_refused(ExitCode::resources, "voxels of 0.05 mm make a grid of more than",
-                 [&] { static_cast<void>(import_bone(folder, {.source = {}, .lower = 300, .spacing_mm = 0.05})); });
-  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -95,18 +95,32 @@ TEST(Vibration, HasThePeaksOfItsSpectrum) {
 TEST(Vibration, TheFileIsCheckedWithThePlace) {
   const auto refused = [](const std::string& text, const std::string& part) {
     try {
-      static_cast<void>(parse_vibration(text, "'v.json'"));
+      static_cast<void>(parse_vibration(text, "v.json"));
       return false;
     } catch (const Error& e) {
       return e.code() == ExitCode::usage && std::string(e.what()).find(part) != std::string::npos;
     }
   };
-  EXPECT_TRUE(refused("{", "header"));
+  EXPECT_TRUE(refused("{", "'v.json' line 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 2})", "must be 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [400, 20]})", "band_hz"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [20, 400], "cutting": [{"frequency_hz": -1, "idle_n": 0, "per_n": 0}]})",
                       "cutting 1"));
   EXPECT_TRUE(refused(R"({"osteotome_vibration": 1, "band_hz": [20, 400], "cutting": []})", "diamond"));
+  // Nothing is left out in silence.
+  const std::string good(default_vibration_json());
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  EXPECT_NO_THROW(static_cast<void>(parse_vibration(good, "v.json")));
+  EXPECT_TRUE(
+      refused(with("\"band_hz\": [20, 400],", "\"band_hz\": [20, 400],\n\"band\": [1, 2],"), "line 5: the key \"band\" is not known"));
+  EXPECT_TRUE(
+      refused(with("\"idle_n\": 0.015", "\"idle\": 0.015"), "line 7: cutting 2: the key \"idle\" is not known: did you mean \"idle_n\"?"));
+  EXPECT_TRUE(refused(with("\"idle_n\": 0.015", "\"idle_n\": 15"), "line 7: cutting 2: \"idle_n\" is 15 and must be from 0 to 10"));
+  EXPECT_TRUE(refused(with("[20, 400]", "[20, 1e400]"), "line 4"));
 }
 
 TEST(Shaft, CollidesAndTurnsTheHand) {

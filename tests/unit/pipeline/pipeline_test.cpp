@@ -268,6 +268,16 @@ TEST(Parse, MistakesAreNamedWithThePlace) {
   EXPECT_NE(what(R"({"osteotome": 1, "stages": [{"stage": "make"}, {"stage": "make"}]})").find("two stages"), std::string::npos);
   EXPECT_NE(what(R"({"osteotome": 1, "stages": [{"id": "a.b", "stage": "make"}]})").find("no dots"), std::string::npos);
   EXPECT_NE(what(R"({"stages": []})").find("osteotome"), std::string::npos);
+  const auto says = [&](const char* text, const char* part) { EXPECT_NE(what(text).find(part), std::string::npos) << what(text); };
+  says("{\"osteotome\": 1,\n\"stage\": []}", "'pipeline' line 2: the key \"stage\" is not known: did you mean \"stages\"?");
+  says("{\"osteotome\": 1, \"stages\": [\n{\"stage\": \"make\",\n\"parms\": {}}]}", "line 3: stage 1: the key \"parms\" is not known");
+  says("{\"osteotome\": 1, \"stages\": [\n{\"stage\": \"make\", \"params\": {\n\"value\": {}}}]}",
+       "line 3: stage 'make' parameter 'value': must be");
+  says("{\"osteotome\": 1,\n\"stages\": [{\"stage\": \"make\",\n \"in\": {\"image\": 7}}]}", "line 3: stage 'make' input 'image'");
+  says("{\"osteotome\": 1,\n\"stages\": [{\"stage\": \"make\", \"out\": {\"image\":\n \"${where}/x\"}}]}",
+       "line 3: stage 'make' output 'image': the variable 'where' has no value");
+  says("{\"osteotome\": 1, \"stages\": [],\n\"stages\": []}", "line 2: the key \"stages\" is there twice");
+  says("{\"osteotome\": 2, \"stages\": []}", "must be 1");
 }
 
 TEST(Validate, OrdersFindsCirclesAndTwoWriters) {

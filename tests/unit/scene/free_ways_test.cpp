@@ -7,10 +7,12 @@
 #include <functional>
 
 #include "osteo/bone/burr.h"
+#include "osteo/bone/structure_map.h"
 #include "osteo/dicom/import.h"
 #include "osteo/grid/resample.h"
 #include "osteo/haptics/renderer.h"
 #include "osteo/image/phantom.h"
+#include "osteo/image/structures.h"
 #include "osteo/image/threshold.h"
 #include "osteo/scene/free_ways.h"
 
@@ -127,8 +129,8 @@ class Hand {
 };
 
 // From each view to what one sees there, beginning where the view before ended.
-void from_six_views(const char* name, const World& world) {
-  const FreeWays ways(world, skin_of_instrument(kTool));
+void from_six_views(const char* name, const World& world, const StructureMap* structures = nullptr) {
+  const FreeWays ways(world, skin_of_instrument(kTool), structures);
   const HandPose start = ways.waiting(normalized(kViews[0].eye), kViews[0].axis());
   Hand hand(world, start);
   hand.tick();
@@ -144,7 +146,7 @@ void from_six_views(const char* name, const World& world) {
       if (!at) continue;
       EXPECT_EQ(hand.walk({}), Led::arrived);
       const auto began = std::chrono::steady_clock::now();
-      const FreeWays::Approach a = ways.approach(hand.pose(), *at, normalized(aim - eye), view.axis());
+      const FreeWays::Found a = ways.approach(hand.pose(), *at, normalized(aim - eye), view.axis());
       plan_s = std::max(plan_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
       const double from_s = hand.seconds();
       EXPECT_EQ(hand.walk(a.way), Led::arrived) << name << ", " << view.name << " " << across;
@@ -165,7 +167,7 @@ void from_six_views(const char* name, const World& world) {
   // Whatever the hand is in, it gets out.
   const View& last = kViews[5];
   hand.walk({});
-  const HandWay out = ways.way(hand.pose(), ways.waiting(normalized(last.eye), last.axis()));
+  const HandWay out = ways.way(hand.pose(), ways.waiting(normalized(last.eye), last.axis())).way;
   EXPECT_EQ(hand.walk(out), Led::arrived) << name;
   EXPECT_EQ(hand.force_n(), 0);
   std::printf(
@@ -185,6 +187,19 @@ TEST(FreeWays, FromSixViewsOnThePhantomsTemporalBone) {
   p.region = PhantomRegion::temporal;
   p.spacing_mm = 0.8;
   from_six_views("phantom temporal bone", world_of(make_phantom(p).ct, 500, 0.8));
+}
+
+// Structures cost little where they are, and change nothing where they are covered by bone.
+TEST(FreeWays, FromSixViewsWithStructuresAtRisk) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 0.8;
+  const Phantom phantom = make_phantom(p);
+  StructuresParams named;
+  named.names = "6=facial nerve, 7=sigmoid sinus";
+  named.only_named = true;
+  const StructureMap structures(name_structures(phantom.labels, named));
+  from_six_views("phantom temporal bone with structures", world_of(phantom.ct, 500, 0.8), &structures);
 }
 
 TEST(FreeWays, FromSixViewsOnAHead) {
@@ -216,12 +231,12 @@ TEST(FreeWays, BackThroughATunnel) {
   Hand hand(world, inside);
   hand.tick();
   const HandPose outside = ways.waiting({0, 0, 1}, {0, 0, 1});
-  const HandWay way = ways.way(inside, outside);
+  const HandWay way = ways.way(inside, outside).way;
   EXPECT_FALSE(way.put);
   EXPECT_EQ(hand.walk(way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
   // And in again, to the floor of the tunnel's far end, which only a slanting look can see: as near as it gets, never harder.
-  const FreeWays::Approach a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
+  const FreeWays::Found a = ways.approach(hand.pose(), {8, 0, -7}, {0, 0, -1}, {0, 0, 1});
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
   EXPECT_LT(hand.most_n(), 1.0);
 }
@@ -233,7 +248,7 @@ TEST(FreeWays, OutOfAClosedShellItIsPut) {
   // The shaft sticks in the shell: jammed, as the drill was that began at the origin.
   Hand hand(world, {{0, 0, 0}, normalized({0.6, 0.4, 0.6})});
   for (int t = 0; t < 1000; ++t) hand.tick();
-  const FreeWays::Approach a = ways.approach(hand.pose(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
+  const FreeWays::Found a = ways.approach(hand.pose(), {20, 0, 0}, {-1, 0, 0}, normalized({0.64, 0.62, 0.45}));
   EXPECT_TRUE(a.way.put);
   const double jammed_n = hand.force_n();
   EXPECT_EQ(hand.walk(a.way), Led::arrived);
@@ -252,7 +267,7 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
   EXPECT_GT(hand.removed_mm3(), 5);
   const double before = hand.force_n();
   hand.walk({});
-  hand.device().lead(ways.way(hand.pose(), ways.waiting({0, 0, 1}, axis)));
+  hand.device().lead(ways.way(hand.pose(), ways.waiting({0, 0, 1}, axis)).way);
   double last = before, removed = hand.removed_mm3();
   hand.tick();
   for (int t = 0; hand.device().led() == Led::on_the_way && t < 20000; ++t) {
@@ -337,6 +352,94 @@ TEST(FreeWays, WaitsInFreeAirWhereverOneLooksFrom) {
     EXPECT_TRUE(ways.free(pose, 2));
     EXPECT_GT(dot(pose.at_mm - ways.centre_mm(), normalized(view.eye)), ways.radius_mm());
   }
+}
+
+// Structures where `inside` says so, on labels of half a millimetre around the origin.
+StructureMap structures_of(Vec3 half_mm, const std::function<bool(Vec3)>& inside) {
+  const double h = 0.5;
+  Labels labels;
+  Frame& f = labels.frame;
+  f.spacing_mm = {h, h, h};
+  for (std::size_t a = 0; a < 3; ++a) f.dims[a] = 2 * static_cast<int>(half_mm[a] / h);
+  f.origin_mm = half_mm * -1 + Vec3{h / 2, h / 2, h / 2};
+  const auto voxels = make_voxels<std::uint8_t>(f.voxel_count());
+  std::size_t v = 0;
+  for (int k = 0; k < f.dims[2]; ++k)
+    for (int j = 0; j < f.dims[1]; ++j)
+      for (int i = 0; i < f.dims[0]; ++i) voxels[v++] = inside(f.world_from_index({double(i), double(j), double(k)})) ? 1 : 0;
+  labels.voxels = voxels;
+  labels.structures = {{1, "nerve", {240, 220, 60}}};
+  return StructureMap(labels);
+}
+
+// The nearest that the whole tool came to a structure on a way.
+double least_clearance(const StructureMap& structures, Hand& hand, const HandWay& way) {
+  const Burr& burr = burr_library()[kTool];
+  double least = structures.reach_mm();
+  hand.device().lead(way);
+  hand.tick();
+  for (int t = 0; t < 60000 && hand.device().led() == Led::on_the_way; ++t) {
+    if (t % 20 == 0) {
+      const HandPose p = hand.pose();
+      for (const RoundCone& part : {burr.head(), burr.shaft()})
+        least = std::min(least, structures.clearance(part, p.at_mm, p.axis).distance_mm);
+    }
+    hand.tick();
+  }
+  EXPECT_EQ(hand.device().led(), Led::arrived);
+  return least;
+}
+
+// A pit with a nerve laid bare across it, above the burr: past the nerve, not through it.
+TEST(FreeWays, KeepClearOfANerveThatHasBeenLaidBare) {
+  const World world = carved({24, 24, 12}, [](Vec3 p) { return p.z < 4 && (std::abs(p.x) > 14 || std::abs(p.y) > 9 || p.z < -8); });
+  const StructureMap nerve = structures_of({24, 24, 14}, [](Vec3 p) { return std::hypot(p.x, p.z) < 1.2; });
+  const HandPose inside{{0, 0, -5}, normalized({0.7, 0, 0.7})};
+  const ToolSkin skin = skin_of_instrument(kTool);
+  const FreeWays of_bone(world, skin), ways(world, skin, &nerve);
+  ASSERT_TRUE(of_bone.free(inside, 0.4));
+  ASSERT_TRUE(ways.free(inside, 0.4));
+  EXPECT_FALSE(ways.free({{0, 0, 0}, {0, 1, 0}}, -0.3));  // on the nerve, in free air
+  const HandPose outside = of_bone.waiting({0, 0, 1}, normalized({0.7, 0, 0.7}));
+  const auto clearance = [&](const FreeWays& w) {
+    Hand hand(world, inside);
+    hand.tick();
+    const FreeWays::Found out = w.way(inside, outside);
+    EXPECT_FALSE(out.way.put);
+    EXPECT_FALSE(out.past_structures);
+    return least_clearance(nerve, hand, out.way);
+  };
+  EXPECT_LT(clearance(of_bone), 0.2);  // as it was: the nerve is brushed
+  EXPECT_GT(clearance(ways), FreeWays::kClearOfStructuresMm - 0.2);
+
+  // And down to bone behind the nerve: to a place beside the line of sight's end that is clear of it.
+  Hand hand(world, outside);
+  hand.tick();
+  const FreeWays::Found down = ways.approach(hand.pose(), {5, 0, -8}, {0, 0, -1}, {0, 0, 1});
+  EXPECT_FALSE(down.way.put);
+  EXPECT_FALSE(down.past_structures);
+  EXPECT_LT(length(down.end.at_mm - Vec3{5, 0, -8}), 3.5);
+  EXPECT_GT(least_clearance(nerve, hand, down.way), FreeWays::kClearOfStructuresMm - 0.2);
+}
+
+// A membrane over the whole mouth of a pit: the way leads through it, and that is told.
+TEST(FreeWays, PastAStructureOnlyWhereNothingElseIsFree) {
+  const World world = carved({16, 16, 12}, [](Vec3 p) { return std::abs(p.x) > 7 || std::abs(p.y) > 7 || p.z < -8; });
+  const StructureMap membrane = structures_of({20, 20, 14}, [](Vec3 p) { return std::abs(p.z - 4) < 0.6; });
+  // Held upright, so that the shaft alone goes through.
+  const HandPose inside{{0, 0, -4}, {0, 0, 1}};
+  const FreeWays ways(world, skin_of_instrument(kTool), &membrane);
+  const HandPose outside = ways.waiting({0, 0, 1}, {0, 0, 1});
+  EXPECT_TRUE(ways.free(outside, 2));
+  const FreeWays::Found out = ways.way(inside, outside);
+  EXPECT_TRUE(out.past_structures);
+  EXPECT_FALSE(out.way.put);
+  Hand hand(world, inside);
+  hand.tick();
+  EXPECT_EQ(hand.walk(out.way), Led::arrived);
+  EXPECT_LT(hand.most_n(), 1.0);
+  // Without the membrane in the way nothing is told of it.
+  EXPECT_FALSE(ways.way(outside, ways.waiting({1, 0, 0}, {0, 0, 1})).past_structures);
 }
 
 }  // namespace

@@ -92,7 +92,7 @@ TEST_F(Memory, HoldsFilesByTheirContent) {
 TEST_F(Memory, WhatNamesAPatientIsNotInTheCase) {
   const TemporaryFolder at;
   Recipe r{.source_hash = "abc", .structures_hash = "def", .settings = {{"lower", "500"}, {"series", "1.2.3.4.5"}}, .withheld = {"series"}};
-  const std::string text = recipe_json(r);
+  const std::string text = recipe_json(r).dump();
   EXPECT_EQ(text.find("1.2.3.4.5"), std::string::npos);
   put(at.path() / "manifest.json", R"({"osteotome_case": 1, "recipe": )" + text + "}");
   auto read = read_recipe(at.path());
@@ -222,6 +222,33 @@ TEST(Case, ForeignFilesAreTold) {
   put(c.folder / "preview.png", "a photograph");
   EXPECT_TRUE(foreign_files(c.folder, {c.folder / "bone.vdb"}).empty());
   EXPECT_EQ(foreign_files(c.folder, {c.folder / "bone.vdb", c.folder / "preview.png"}), std::vector<std::string>{"preview.png"});
+}
+
+TEST(Case, AManifestIsReadStrictly) {
+  const std::string good = R"({"osteotome_case": 1,
+    "files": {"bone": {"file": "bone.vdb", "hash": "x"},
+              "hu": {"file": "hu.vdb", "hash": "y"}},
+    "steps": []})";
+  EXPECT_EQ(parse_manifest(good).at("hu").hash, "y");
+  const auto says = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string changed = good;
+    changed.replace(changed.find(from), from.size(), to);
+    try {
+      static_cast<void>(parse_manifest(changed, "c/manifest.json"));
+      ADD_FAILURE() << to << " was read";
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::corrupt);
+      EXPECT_FALSE(e.advice().empty());
+      EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
+    }
+  };
+  says("\"steps\"", "\"stpes\"", "'c/manifest.json' line 4: the key \"stpes\" is not known: did you mean \"steps\"?");
+  says("\"hash\": \"y\"", "\"hash\": \"y\", \"size\": 3", "line 3: hu: the key \"size\" is not known");
+  says("\"hash\": \"y\"", "\"hash\": 3", "line 3: hu: \"hash\" must be a text");
+  says("hu.vdb", "../hu.vdb", "line 3: hu: '../hu.vdb' is no file inside the case");
+  says("\"bone\"", "\"born\"", "it names no bone");
+  says("\"osteotome_case\": 1", "\"osteotome_case\": 2", "\"osteotome_case\" must be 1");
+  says("\"steps\": []}", "\"steps\": []", "this is not valid JSON");
 }
 
 TEST(Case, FactsOfStepsThatWereNotDoneAgainAreKept) {

@@ -41,6 +41,45 @@ TEST(TissueProblem, IsReadOntoAMesh) {
   EXPECT_EQ(p.loads[1].forces_n.size(), 9u);
 }
 
+TEST(TissueProblem, ValuesOutOfRangeAreRefusedWithTheirLine) {
+  const TetMesh mesh = mesh_of(test::block(4, 2, 2, 5.0));
+  const std::string good = R"({"osteotome_tissue": 1,
+    "material": {"young_kpa": 100, "poisson": 0.45},
+    "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 11, 11]]}],
+    "loads": [{"name": "A",
+      "forces": [{"at_mm": [20, 5, 5], "radius_mm": 6, "total_n": [0, 0, 2]}],
+      "surfaces": [{"box_mm": [[19, -1, -1], [21, 11, 11]], "kpa": 2}]}]})";
+  EXPECT_NO_THROW(static_cast<void>(parse_tissue_problem(good, mesh)));
+  const auto says = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string changed = good;
+    ASSERT_NE(changed.find(from), std::string::npos) << from;
+    changed.replace(changed.find(from), from.size(), to);
+    try {
+      static_cast<void>(parse_tissue_problem(changed, mesh));
+      ADD_FAILURE() << to << " was read";
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::usage);
+      EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
+    }
+  };
+  says("\"young_kpa\": 100", "\"young_kpa\": -100", "line 2: material: \"young_kpa\" is -100");
+  says("0.45", "0.5", "line 2: material: \"poisson\"");
+  says("0.45", "\"much\"", "line 2: material: \"poisson\" (Poisson's ratio) must be a number");
+  says("100, \"poisson\"", "100, \"density\": 1, \"poisson\"", "line 2: material: the key \"density\" is not known");
+  says("[0.1, 11, 11]", "[-0.1, -11, 11]", "line 3: fixed 1: \"box_mm\" must be its lower corner, then its upper");
+  says("[0.1, 11, 11]", "[0.1, 11]", "line 3: fixed 1: \"box_mm\" must have 3 items");
+  says("[0.1, 11, 11]", "[0.1, 11, 1e9]", "line 3: fixed 1: \"box_mm\" is 1e+09");
+  says("[0.1, 11, 11]]", "[0.1, 11, 11]], \"axes\": \"xw\"", "line 3: fixed 1: \"axes\" are made of x, y and z");
+  says("[0.1, 11, 11]]", "[0.1, 11, 11]], \"at_mm\": [0, 0, 0]", "line 3: fixed 1: it needs a place");
+  says("\"radius_mm\": 6", "\"radius_mm\": 0", "line 5: load 1, force 1: \"radius_mm\" is 0");
+  says("\"radius_mm\": 6, ", "", "line 5: load 1, force 1: it needs a place");
+  says("[0, 0, 2]", "[0, 0, 2e9]", "line 5: load 1, force 1: \"total_n\"");
+  says("\"kpa\": 2", "\"kpa\": true", "line 6: load 1, surface 1: \"kpa\" must be a number");
+  says("\"kpa\": 2", "\"kpa\": -2e6", "line 6: load 1, surface 1: \"kpa\" is -2e+06");
+  says("\"fixed\"", "\"fixde\"", "line 3: the key \"fixde\" is not known: did you mean \"fixed\"?");
+  says("\"osteotome_tissue\": 1", "\"osteotome_tissue\": 2", "line 1: \"osteotome_tissue\" must be 1");
+}
+
 TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
   if (!has_ceres()) GTEST_SKIP() << "built without Ceres: calibration not tested";
   const auto b = test::block(6, 3, 3, 2.0);

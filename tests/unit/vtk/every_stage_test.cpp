@@ -22,11 +22,11 @@
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
 #include "osteo/io/vtk_data.h"
-#include "osteo/meshing/stages.h"
+#include "osteo/stages/mesh.h"
+#include "osteo/stages/registry.h"
 #include "osteo/tissue/calibrate.h"
 #include "osteo/vtk/vtkOsteoDataObject.h"
 #include "osteo/vtk/vtkOsteoStage.h"
-#include "stages.h"
 
 namespace osteo {
 namespace {

@@ -6,8 +6,8 @@
 #include <vtkSphereSource.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "osteo/distance/stages.h"
-#include "osteo/meshing/stages.h"
+#include "osteo/stages/distance.h"
+#include "osteo/stages/mesh.h"
 #include "osteo/tets/skin.h"
 #include "osteo/vtk/vtkOsteoDataObject.h"
 #include "osteo/vtk/vtkOsteoStage.h"

@@ -15,6 +15,9 @@
 #include "osteo/image/threshold.h"
 #include "osteo/io/vtk_data.h"
 #include "osteo/mesh/bone_surface.h"
+#include "osteo/stages/bone.h"
+#include "osteo/stages/image.h"
+#include "osteo/stages/import.h"
 #include "osteo/vtk/vtkOsteoDataObject.h"
 #include "osteo/vtk/vtkOsteoStage.h"
 

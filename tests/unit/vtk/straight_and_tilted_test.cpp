@@ -13,8 +13,8 @@
 #include <cstdio>
 
 #include "osteo/base/files.h"
+#include "osteo/bone_import/import_bone.h"
 #include "osteo/dicom/import.h"
-#include "osteo/grid/import_bone.h"
 #include "osteo/grid/resample.h"
 #include "osteo/image/threshold.h"
 #include "osteo/io/vtk_data.h"

@@ -2,9 +2,10 @@
 #pragma once
 #include <filesystem>
 
+#include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/volume.h"
 #include "osteo/dicom/place.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -33,20 +34,5 @@ struct Imported {
 
 /// Warnings and facts of a verdict to log and report.
 void tell_verdict(const Verdict& verdict, const Context& context);
-
-struct ImportStage {
-  using Params = ImportParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
-    visit({"stack", "which stack of a series that holds several (0: the best)", "", 0, 1000}, p.stack);
-    visit({"max_gap_mm", "widest usual distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
-    visit({"max_hole_mm", "widest distance that is interpolated where slices are missing", "mm", 0, 50}, p.max_hole_mm);
-    visit({"any_modality", "take a series that is no CT; its values are not HU"}, p.any_modality);
-    visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"},
-          p.axes);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

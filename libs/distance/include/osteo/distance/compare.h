@@ -1,8 +1,8 @@
 // How far apart two surfaces are.
 #pragma once
 #include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/mesh/soup.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -25,15 +25,5 @@ struct SurfaceComparison {
 /// cannot hold the maximum. Stops when bound and maximum agree to 1e-4 of the extents, or after 200,000 questions; then the
 /// bound says so. Same result for any thread count. Errors: as of TriangleTree.
 [[nodiscard]] SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b, const Context& context = {});
-
-struct CompareParams {
-  double iso = 0.5;
-};
-struct CompareStage {
-  using Params = CompareParams;
-  static void describe(Params& p, auto& visit) { visit({"iso", "value at the surface of a grid", "", -1e9, 1e9}, p.iso); }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/frame.h"
 #include "osteo/data/volume.h"
 #include "osteo/mesh/soup.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 

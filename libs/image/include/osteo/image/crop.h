@@ -1,7 +1,8 @@
 // A region cut out of a CT.
 #pragma once
+#include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/volume.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -30,16 +31,5 @@ struct Box {
 /// The smallest block of whole voxels that covers the box. Error(usage) when the box lies outside.
 [[nodiscard]] Image crop(const Image& ct, const Box& box);
 [[nodiscard]] Labels crop(const Labels& labels, const Box& box);
-
-struct CropStage {
-  using Params = CropParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"region", "what to cut out; the left is the patient's"}, p.region);
-    visit({"centre_mm", "centre of the box, LPS (0,0,0: as found)", "mm"}, p.centre_mm);
-    visit({"size_mm", "edges of the box along left-right, front-back, feet-head (0,0,0: as the region has)", "mm"}, p.size_mm);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

@@ -3,8 +3,9 @@
 #include <cstdint>
 #include <string_view>
 
+#include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/volume.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -50,17 +51,5 @@ struct Phantom {
 };
 /// Same parameters and context.seed (of the noise), same bytes, for any number of threads.
 [[nodiscard]] Phantom make_phantom(const PhantomParams& params, const Context& context = {});
-
-struct PhantomStage {
-  using Params = PhantomParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"region", "the whole head, or a block around the left temporal bone"}, p.region);
-    visit({"spacing_mm", "voxel size in the slice", "mm", 0.2, 4}, p.spacing_mm);
-    visit({"slice_mm", "distance of slices (0: same as spacing_mm)", "mm", 0, 10}, p.slice_mm);
-    visit({"noise_hu", "standard deviation of the noise", "HU", 0, 200}, p.noise_hu);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

@@ -2,8 +2,9 @@
 #pragma once
 #include <string>
 
+#include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/volume.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -17,15 +18,5 @@ struct StructuresParams {
 /// Error(failed) when no labelled voxel lies inside it, a warning when less than half do. Error(usage) for names that cannot be read.
 [[nodiscard]] Labels name_structures(const Labels& labels, const StructuresParams& params, const Image* ct = nullptr,
                                      const Context& context = {});
-
-struct StructuresStage {
-  using Params = StructuresParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"names", "what the values stand for, like '1=facial nerve, 2=sigmoid sinus' (empty: as the file says)"}, p.names);
-    visit({"only_named", "values that neither names nor the file name are background: tissue that is not at risk"}, p.only_named);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

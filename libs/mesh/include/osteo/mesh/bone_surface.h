@@ -4,9 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/tri_mesh.h"
 #include "osteo/grid/brick_grid.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -77,28 +78,5 @@ void extract_patch(const BrickGrid& bone, std::uint32_t brick, float iso, Surfac
 
 /// Patches in brick order, joined at equal vertices, in LPS mm.
 [[nodiscard]] BoneSurface join_patches(const BrickGrid& bone, std::span<const SurfacePatch> patches);
-
-// --- the stage -----------------------------------------------------------------------------------------------------
-
-enum class SurfaceMethod : int { nets, voxel };
-template <>
-struct EnumNames<SurfaceMethod> {
-  static constexpr std::array<std::string_view, 2> values{"nets", "voxel"};
-};
-
-struct SurfaceParams {
-  SurfaceMethod method = SurfaceMethod::nets;
-  double iso = 0.5;
-};
-
-struct SurfaceStage {
-  using Params = SurfaceParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"method", "nets: smooth, closed and manifold; voxel: each vertex is a voxel, as in the thesis"}, p.method);
-    visit({"iso", "density at the surface", "", 0.01, 0.99}, p.iso);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
-};
 
 }  // namespace osteo

@@ -58,8 +58,9 @@ struct ManifestFile {
   std::string name;  ///< in the case's folder
   std::string hash;
 };
-/// Role -> file. Error(corrupt) for what is no manifest, names no bone, or names a file outside the case.
-[[nodiscard]] std::map<std::string, ManifestFile> parse_manifest(std::string_view json);
+/// Role -> file. Error(corrupt), with the line, for what is no manifest, has a key that is not known, names no bone, or names a file
+/// outside the case. `name` as errors call it.
+[[nodiscard]] std::map<std::string, ManifestFile> parse_manifest(std::string_view json, const std::string& name = "manifest.json");
 
 /// Finishes an interrupted commit, reads the manifest, checks that the files are there and unchanged, loads the bone. Errors: no_input,
 /// corrupt.

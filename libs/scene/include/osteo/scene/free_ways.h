@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "osteo/bone/structure_map.h"
 #include "osteo/haptics/device.h"
 
 namespace osteo {
@@ -26,36 +27,44 @@ struct ToolSkin {
 /// A plate as it is gripped.
 [[nodiscard]] ToolSkin skin_of_plate(std::size_t plate, const RigidTransform& grip);
 
-/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Soft tissue and structures at risk are not
-/// looked at: a way may touch a nerve that has been laid bare (it counts as touched; the drill is off). One thread.
+/// Looks at bone as it is now; bodies that change meanwhile are seen in part as they were. Structures at risk are in the way like bone,
+/// with kClearOfStructuresMm between them and the tool; where a tool is nearer at the beginning it may not come nearer. Soft tissue is not
+/// looked at. One thread.
 class FreeWays {
  public:
-  /// Keeps the bodies of the world, not the world. O(bricks).
-  FreeWays(const World& world, ToolSkin tool);
+  /// More than the error of the structures' faces (StructureMap) with voxels of a millimetre.
+  static constexpr double kClearOfStructuresMm = 0.5;
+
+  /// Keeps the bodies of the world, not the world; `structures`, where there are some, must outlive it. O(bricks).
+  FreeWays(const World& world, ToolSkin tool, const StructureMap* structures = nullptr);
 
   /// The ball that all bone lies in.
   [[nodiscard]] Vec3 centre_mm() const { return centre_mm_; }
   [[nodiscard]] double radius_mm() const { return radius_mm_; }
 
-  /// No bone within `margin_mm` of the tool's surface; a negative margin lets it be that deep.
+  /// No bone within `margin_mm` of the tool's surface, a negative margin lets it be that deep; and no structure within that, or within
+  /// kClearOfStructuresMm where that is more.
   [[nodiscard]] bool free(const HandPose& pose, double margin_mm) const;
 
   /// Beside the bone, on the side of `eye` (unit, from the bone towards who looks); `axis` should not point away from there.
   [[nodiscard]] HandPose waiting(Vec3 eye, Vec3 axis) const;
 
-  /// Out of the bone, across free air, to a place that is free. `put` where the tool is shut in, so that no way was found.
-  [[nodiscard]] HandWay way(const HandPose& from, const HandPose& to) const;
-
-  struct Approach {
+  struct Found {
     HandWay way;
     HandPose end;
+    /// No way keeps clear of the structures; this one is clear of bone only, and may touch them.
+    bool past_structures = false;
   };
+  /// Out of the bone, across free air, to a place that is free. `put` where the tool is shut in, so that no way was found.
+  [[nodiscard]] Found way(const HandPose& from, const HandPose& to) const;
+
   /// To bone that is seen along `forward` (unit) at `seen_mm`: the nearest place before it on that line of sight where the tool is free by
   /// half a millimetre and gets to from outside. Held along `axis`, or where it does not fit so, leaning to another side or towards who
   /// looks.
-  [[nodiscard]] Approach approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
+  [[nodiscard]] Found approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
 
-  /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it does.
+  /// `axis` turned towards `wanted`, by `most_rad` at most and only as far as the tool touches no more bone than it does, nor comes nearer
+  /// to a structure that it is close to.
   [[nodiscard]] Vec3 turned(const HandPose& pose, Vec3 wanted, double most_rad) const;
 
  private:
@@ -76,11 +85,17 @@ class FreeWays {
   [[nodiscard]] std::optional<Poses> over(const HandPose& from, const HandPose& to, Vec3 lift) const;
   [[nodiscard]] bool free_leg(const HandPose& a, const HandPose& b, double margin_mm) const;
   [[nodiscard]] std::size_t touching(const HandPose& pose, double margin_mm, std::size_t most) const;
+  [[nodiscard]] std::size_t touching_bone(const HandPose& pose, double margin_mm, std::size_t most) const;
+  [[nodiscard]] std::size_t touching_structures(const HandPose& pose, double clear_mm, std::size_t most) const;
+  [[nodiscard]] Found found_way(const HandPose& from, const HandPose& to) const;
+  [[nodiscard]] Found found_approach(const HandPose& from, Vec3 seen_mm, Vec3 forward, Vec3 axis) const;
+  [[nodiscard]] Found clear_or_past_structures(const auto& find) const;
   [[nodiscard]] double margin_at(const HandPose& pose) const;
   [[nodiscard]] std::optional<HandWay> finished(const HandPose& from, const Poses& poses) const;
 
   std::vector<Bone> bones_;
   ToolSkin tool_;
+  const StructureMap* structures_;
   Vec3 centre_mm_;
   double radius_mm_ = 0;
 };

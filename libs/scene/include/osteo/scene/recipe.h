@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "osteo/base/json_document.h"
+
 namespace osteo {
 
 /// Kept in the manifest. It holds no paths and no UIDs, since those may name the patient: files are known by the hashes of their content.
@@ -22,7 +24,7 @@ struct Recipe {
   friend bool operator==(const Recipe&, const Recipe&) = default;
 };
 
-[[nodiscard]] std::string recipe_json(const Recipe& recipe);
+[[nodiscard]] Json recipe_json(const Recipe& recipe);
 /// Of the case's manifest; nothing when there is no manifest, or an old one without a recipe. Error(corrupt) when it is damaged.
 [[nodiscard]] std::optional<Recipe> read_recipe(const std::filesystem::path& case_folder);
 

@@ -23,8 +23,8 @@ struct SoftTool {
 /// A body of voxels by the fast model (libs/tissue). Its steps in time run a hundred times a second beside the servo; what the hand feels
 /// between them is a plane: the force now, along its own direction, rising with depth. Each such plane is an action of the stream, so a
 /// replay needs no tissue. It meets the head of the instrument in its own shape, and the bone as it is now: where it lies in bone at rest
-/// it has grown on it, until the bone there is drilled away. A burr that turns cuts voxels off, by force and time as in bone,
-/// kEasierThanBone times as fast; what comes loose is gone with them.
+/// it has grown on it, until the bone there is drilled away.
+/// A burr that turns cuts voxels off (VoxelCutting); what comes loose is gone with them.
 class SoftBody {
  public:
   /// From mesh, problem and perhaps constants, as the stages of tissue take them; `skin`: a finer surface that is drawn instead of the
@@ -34,9 +34,6 @@ class SoftBody {
   ~SoftBody();
 
   static constexpr double kUpdatesPerS = 100;
-  /// Guesses, no measured rates were found: a twentieth of a newton cuts some tens of mm3 a second, and no burr more than powered shavers
-  /// do.
-  static constexpr double kEasierThanBone = 200, kMostMm3PerS = 100;
   /// The bone that it meets from now on, as it lies at rest; null: none. The world must stay until another is set.
   void meet(const World* world);
   /// Goes on by one update with the tool there; the plane that it pushes with now, or nothing when it pushed neither before nor

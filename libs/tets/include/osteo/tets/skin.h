@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "osteo/base/context.h"
+#include "osteo/base/param.h"
 #include "osteo/data/tet_mesh.h"
-#include "osteo/stage/stage.h"
 
 namespace osteo {
 
@@ -64,21 +64,6 @@ class Skin {
   std::vector<std::array<std::uint32_t, 3>> fan_;
   std::vector<Vote> votes_;
   int neighbours_ = 0;
-};
-
-struct SkinParams {
-  SkinMethod method = SkinMethod::embedded;
-  int neighbours = 5;
-};
-struct SkinStage {
-  using Params = SkinParams;
-  static void describe(Params& p, auto& visit) {
-    visit({"method", "embedded: by position in the tetrahedron; frames: by frames on the nearest surface points, as in the thesis"},
-          p.method);
-    visit({"neighbours", "frames: how many surface points each point follows", "", 1, 16}, p.neighbours);
-  }
-  static StageInfo info();
-  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
 };
 
 }  // namespace osteo

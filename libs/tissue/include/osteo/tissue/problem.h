@@ -20,6 +20,8 @@ namespace osteo {
 /// A surface is loaded where the middle of a triangle of the body's boundary lies in its place: "kpa", one number: a pressure inwards;
 /// three: force over area. Both are of the shape at rest. With "axes" points are held along those only, and slide along the others.
 /// Tetrahedra whose middle lies in a region have its material, the last such region's.
+/// Ranges: young_kpa 1e-6 to 1e9, poisson -0.999 to 0.49999, places within 1e6 mm, radii above 0, forces within 1e6 N, pressures within 1e6
+/// kPa. A key that is not known is an error.
 ///
 /// Or an input file of Abaqus or CalculiX, with mm, N and MPa, whose mesh `mesh` is (load_tets): *ELASTIC or *HYPERELASTIC, NEO HOOKE by
 /// *SOLID SECTION; *BOUNDARY without movement; each *STEP a load of *CLOAD and *DLOAD (P1 to P4), NLGEOM says which law.
@@ -33,7 +35,7 @@ struct TissueProblem {
   std::optional<ElasticLaw> law;  ///< what an .inp says; JSON leaves it open
   std::optional<TetOrder> order;
 };
-/// Errors: usage with the place in the text; for places that no point lies in; for a load on fixed points alone.
+/// Errors: usage with the line and the place in the text; for places that no point lies in; for a load on fixed points alone.
 /// Without `needs_loads` there may be none.
 [[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true);
 /// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and

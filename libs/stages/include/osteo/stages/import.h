@@ -1,0 +1,41 @@
+// The stages import and import-bone.
+#pragma once
+#include "osteo/bone_import/import_bone.h"
+#include "osteo/dicom/import.h"
+#include "osteo/stage/stage.h"
+
+namespace osteo {
+
+struct ImportStage {
+  using Params = ImportParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
+    visit({"stack", "which stack of a series that holds several (0: the best)", "", 0, 1000}, p.stack);
+    visit({"max_gap_mm", "widest usual distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
+    visit({"max_hole_mm", "widest distance that is interpolated where slices are missing", "mm", 0, 50}, p.max_hole_mm);
+    visit({"any_modality", "take a series that is no CT; its values are not HU"}, p.any_modality);
+    visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"},
+          p.axes);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+struct ImportBoneStage {
+  using Params = ImportBoneParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"lower", "HU at the boundary of bone", "HU", -32768, 32767}, p.lower);
+    visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
+    visit({"min_volume_mm3", "drop pieces smaller than this volume", "mm3", 0, 1e9}, p.min_volume_mm3);
+    visit({"keep_largest", "keep only this many of the largest pieces (0 keeps all)", "", 0, 1000000}, p.keep_largest);
+    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.source.series);
+    visit({"stack", "which stack of a series that holds several (0: the best)", "", 0, 1000}, p.source.stack);
+    visit({"max_gap_mm", "widest usual distance between slices that is interpolated", "mm", 0, 50}, p.source.max_gap_mm);
+    visit({"max_hole_mm", "widest distance that is interpolated where slices are missing", "mm", 0, 50}, p.source.max_hole_mm);
+    visit({"any_modality", "take a series that is no CT; its values are not HU"}, p.source.any_modality);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+}  // namespace osteo

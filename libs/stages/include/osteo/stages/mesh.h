@@ -1,0 +1,96 @@
+// The stages mesh-info, mesh-repair, tetrahedralize and skin. The first three use CGAL and TetGen where the build has them.
+#pragma once
+#include "osteo/stage/stage.h"
+#include "osteo/tets/skin.h"
+
+namespace osteo {
+
+struct MeshInfoParams {
+  bool self_intersections = true;
+};
+struct MeshInfoStage {
+  using Params = MeshInfoParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"self_intersections", "count pairs of triangles that intersect (needs a build with CGAL)"}, p.self_intersections);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+struct MeshRepairParams {
+  double weld_mm = 0;
+  int max_hole_edges = 200;
+  bool self_intersections = true;
+  double min_body_area_mm2 = 0;
+  bool keep_largest = false;
+};
+struct MeshRepairStage {
+  using Params = MeshRepairParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"weld_mm", "points nearer than this become one (0: equal ones only)", "mm", 0, 1000}, p.weld_mm);
+    visit({"max_hole_edges", "close holes of at most so many edges (0: none)", "", 0, 1000000}, p.max_hole_edges);
+    visit({"self_intersections", "cut self-intersections out and close the cuts, where that works"}, p.self_intersections);
+    visit({"min_body_area_mm2", "drop bodies of smaller area", "mm2", 0, 1e12}, p.min_body_area_mm2);
+    visit({"keep_largest", "keep only the body of most area"}, p.keep_largest);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+enum class TetMethod : int { grid, grid_conforming, graded, tetgen, cgal };
+template <>
+struct EnumNames<TetMethod> {
+  static constexpr std::array<std::string_view, 5> values{"grid", "grid-conforming", "graded", "tetgen", "cgal"};
+};
+struct TetrahedralizeParams {
+  TetMethod method = TetMethod::grid_conforming;
+  double spacing_mm = 0;
+  int resolution = 40;
+  bool margin = true;
+  double target_dihedral_deg = 15;
+  int levels = 3;
+  double surface_spacing_mm = 0;
+  double max_volume_mm3 = 0;
+  bool clean = false;
+};
+struct TetrahedralizeStage {
+  using Params = TetrahedralizeParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"method",
+           "grid: five to a voxel; grid-conforming: following the surface, any surface; graded: small at the surface, large inside; "
+           "tetgen: keeps the "
+           "surface's triangles; cgal: Delaunay refinement"},
+          p.method);
+    visit({"spacing_mm", "edge of the cubes or tetrahedra (0: from --resolution)", "mm", 0, 1000}, p.spacing_mm);
+    visit({"resolution", "cubes along the longest extent", "", 1, 2000}, p.resolution);
+    visit({"margin", "grid: one voxel more outside, as in the thesis"}, p.margin);
+    visit({"target_dihedral_deg", "grid-conforming: improve tetrahedra below this (0: none)", "degrees", 0, 30}, p.target_dihedral_deg);
+    visit({"levels", "graded: how often edges double inward", "", 0, 8}, p.levels);
+    visit({"surface_spacing_mm", "cgal: size at the surface, growing inward to spacing_mm (0: the same)", "mm", 0, 1000},
+          p.surface_spacing_mm);
+    visit({"max_volume_mm3", "tetgen: largest volume of a tetrahedron (0: from the spacing)", "mm3", 0, 1e12}, p.max_volume_mm3);
+    visit({"clean", "repair the surface first, as mesh-repair does"}, p.clean);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+struct SkinParams {
+  SkinMethod method = SkinMethod::embedded;
+  int neighbours = 5;
+};
+struct SkinStage {
+  using Params = SkinParams;
+  static void describe(Params& p, auto& visit) {
+    visit({"method", "embedded: by position in the tetrahedron; frames: by frames on the nearest surface points, as in the thesis"},
+          p.method);
+    visit({"neighbours", "frames: how many surface points each point follows", "", 1, 16}, p.neighbours);
+  }
+  static StageInfo info();
+  static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);
+};
+
+/// What of CGAL and TetGen this build has, for the licence text: "", "CGAL (GPL)", "CGAL (GPL) and TetGen (AGPL)".
+[[nodiscard]] std::string_view copyleft_parts();
+
+}  // namespace osteo

@@ -1,0 +1,253 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "course_svg.h"
+#include "osteo/base/error.h"
+#include "osteo/base/json_document.h"
+#include "osteo/base/param.h"
+#include "osteo/tissue/calibrate.h"
+#include "tissue_parts.h"
+
+namespace osteo {
+
+using namespace tissue;
+
+namespace {
+
+// What Young's modulus each constraint's stiffness would be in closed form, in kPa.
+std::vector<double> stiffness_kpa(const TissueModel& model, const TissueModel& uniform, const Material& of_uniform) {
+  std::vector<double> all;
+  for (std::size_t c = 0; c < model.constraints().size(); ++c)
+    all.push_back(1000 * of_uniform.young_mpa * model.constraints()[c].stiffness / uniform.base_stiffness(c));
+  return all;
+}
+
+bool is_edge(const TissueModel::Constraint& c) {
+  return c.kind == TissueClass::axis_edge || c.kind == TissueClass::diagonal_edge;
+}
+
+// At each point, the geometric mean over its edges.
+Tets stiffness_map(const TetMesh& mesh, const TissueModel& model, std::span<const double> kpa) {
+  TetMesh map;
+  map.points_mm = mesh.points_mm;
+  map.tets = mesh.tets;
+  map.values_name = "stiffness_kpa";
+  std::vector<double> sum(mesh.points_mm.size()), count(sum.size());
+  for (std::size_t c = 0; c < kpa.size(); ++c) {
+    if (!is_edge(model.constraints()[c])) continue;
+    for (const std::uint32_t p : model.nodes(c)) {
+      sum[p] += std::log(kpa[c]);
+      count[p] += 1;
+    }
+  }
+  for (std::size_t p = 0; p < sum.size(); ++p) map.values.push_back(static_cast<float>(count[p] > 0 ? std::exp(sum[p] / count[p]) : 0));
+  return std::make_shared<const TetMesh>(std::move(map));
+}
+
+// What was learnt of each material: the geometric mean over edges all of whose tetrahedra, and theirs, are of it.
+Json learnt(const TissueProblem& problem, const TissueModel& model, std::span<const double> kpa) {
+  constexpr std::size_t kMixed = ~std::size_t{0}, kUnseen = kMixed - 1;
+  std::vector<std::size_t> of_point(model.point_count(), kUnseen);
+  const auto same = [&](std::size_t a, std::size_t b) {
+    return problem.materials[a].young_mpa == problem.materials[b].young_mpa && problem.materials[a].poisson == problem.materials[b].poisson;
+  };
+  for (std::size_t t = 0; t < problem.materials.size() && problem.materials.size() > 1; ++t) {
+    for (const std::uint32_t p : model.tets()[t]) {
+      if (of_point[p] == kUnseen) of_point[p] = t;
+      if (of_point[p] != kMixed && !same(of_point[p], t)) of_point[p] = kMixed;
+    }
+  }
+  std::map<double, std::pair<double, std::size_t>> sums;  // by true modulus
+  for (std::size_t c = 0; c < kpa.size(); ++c) {
+    if (!is_edge(model.constraints()[c])) continue;
+    const std::size_t a = of_point[model.constraints()[c].node[0]], b = of_point[model.constraints()[c].node[1]];
+    if (a >= kUnseen || b >= kUnseen || !same(a, b)) continue;
+    auto& [sum, count] = sums[1000 * problem.materials[a].young_mpa];
+    sum += std::log(kpa[c]);
+    ++count;
+  }
+  Json all = Json::list();
+  for (const auto& [young, s] : sums)
+    all.push_back({{"young_kpa", young}, {"learnt_kpa", std::exp(s.first / static_cast<double>(s.second))}, {"edges", s.second}});
+  return all;
+}
+
+// Finite elements under one load after another, all held alike.
+class Statics {
+ public:
+  Statics(const FemBody& body, const TissueLoad& held) : body_(body), solver_(body, body.rest(), held) {}
+  std::vector<Vec3> solve(const TissueLoad& load, const Context& context) {
+    const TissueLoad all = body_.on_all_points(load);
+    Equilibrium r = solver_.solve(body_, body_.rest(), all.forces_n, {1e-10, 100, 1}, context);
+    if (!r.converged) r = solver_.solve(body_, body_.rest(), all.forces_n, {1e-10, 100, 8}, context);
+    if (!r.converged) throw not_at_rest(r, "make the load smaller");
+    return r.points_mm;
+  }
+
+ private:
+  const FemBody& body_;
+  EquilibriumSolver solver_;
+};
+
+// Each tetrahedron as eight, over the points of the quadratic body.
+std::vector<std::array<std::uint32_t, 4>> eight_of_each(const FemBody& quadratic) {
+  // Nodes as of C3D10: corners, then the middles of 01, 12, 02, 03, 13, 23.
+  constexpr std::size_t kParts[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
+                                        {4, 6, 7, 8}, {4, 5, 6, 8}, {6, 5, 9, 8}, {6, 9, 7, 8}};
+  const auto& x = quadratic.rest();
+  std::vector<std::array<std::uint32_t, 4>> tets;
+  for (std::size_t e = 0; e < quadratic.element_count(); ++e) {
+    const auto node = quadratic.nodes(e);
+    for (const auto& part : kParts) {
+      std::array<std::uint32_t, 4> t{node[part[0]], node[part[1]], node[part[2]], node[part[3]]};
+      if (dot(x[t[1]] - x[t[0]], cross(x[t[2]] - x[t[0]], x[t[3]] - x[t[0]])) < 0) std::swap(t[2], t[3]);
+      tets.push_back(t);
+    }
+  }
+  return tets;
+}
+
+}  // namespace
+
+StageInfo CalibrateStage::info() {
+  return {
+      .name = "calibrate",
+      .version = 2,
+      .synopsis = "constants of the fast tissue model, fitted to finite elements",
+      .description =
+          "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
+          "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
+          "(Ceres). The "
+          "report holds errors before and after, on loads that were not fitted too, beside the truth's own error of discretisation (linear "
+          "against quadratic tetrahedra, and with --check-truth finer ones: a residual below that says nothing); uncertain factors; the "
+          "course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
+          "regions of "
+          "a body are made of, also without being told of them (--blind).",
+      .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
+                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"}},
+      .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
+                  {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true},
+                  {"map", {DataKind::tets}, "the mesh with the learnt stiffness at its points (snapshot draws it)", true},
+                  {"course", {DataKind::document}, "the course of the fit as a plot (.svg)", true}},
+      .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, sections 5.3 and 5.4",
+                     "M. Teschner et al., A Versatile and Robust Model for Geometrically Complex Deformable Solids, CGI 2004"},
+      .example = "osteo calibrate tissue.vtu problem.json constants.json --fit pull"};
+}
+
+std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+  const TetMesh& mesh = *std::get<Tets>(inputs[0]);
+  const TissueProblem problem = parse_tissue_problem(std::get<Document>(inputs[1]).json, mesh);
+  const auto points = points_of(mesh);
+  const auto tets = tets_of(mesh);
+  TissueProblem known = problem;
+  if (p.blind) known.materials.assign(1, problem.general);
+  TissueModel model = model_of_problem(mesh, known);
+  std::vector<std::size_t> fitted;
+  for (std::size_t at = 0; at < p.fit.size();) {
+    const std::size_t comma = std::min(p.fit.find(',', at), p.fit.size());
+    fitted.push_back(load_named(problem, p.fit.substr(at, comma - at)));
+    at = comma + 1;
+  }
+  if (fitted.empty()) fitted.push_back(0);
+  const Elements elements = elements_for(p.law, p.order, problem, mesh);
+  const auto body = [&](TetOrder order) { return FemBody(points, tets, problem.materials, elements.law, order); };
+  const FemBody true_body = body(elements.order), other_body = body(elements.order == TetOrder::t4 ? TetOrder::t10 : TetOrder::t4);
+  Statics true_statics(true_body, true_body.on_all_points(problem.loads.front())),
+      other_statics(other_body, other_body.on_all_points(problem.loads.front()));
+  // The truth, and how far it may be off itself: the other order on the same mesh.
+  std::vector<std::vector<Vec3>> truth;
+  std::vector<double> doubt;
+  for (std::size_t n = 0; n < problem.loads.size(); ++n) {
+    context.progress(0.5 * static_cast<double>(n) / static_cast<double>(problem.loads.size()), "finite elements");
+    truth.push_back(true_statics.solve(problem.loads[n], context));
+    doubt.push_back(calibration_error(points, other_statics.solve(problem.loads[n], context), truth.back()).nrms);
+  }
+  std::vector<double> doubt_finer;
+  if (p.check_truth) {
+    // Held and loaded as quadratic elements are: in the middle of an edge, too.
+    const FemBody quadratic = body(TetOrder::t10);
+    std::vector<Material> materials = problem.materials;
+    if (materials.size() > 1) {
+      materials.clear();
+      for (const Material& m : problem.materials) materials.insert(materials.end(), 8, m);
+    }
+    const FemBody fine(quadratic.rest(), eight_of_each(quadratic), std::move(materials), elements.law, elements.order);
+    Statics statics(fine, fine.on_all_points(quadratic.on_all_points(problem.loads.front())));
+    for (std::size_t n = 0; n < problem.loads.size(); ++n) {
+      context.progress(0.5, "finite elements half as large");
+      const auto x = statics.solve(quadratic.on_all_points(problem.loads[n]), context);
+      doubt_finer.push_back(calibration_error(points, {truth[n].data(), points.size()}, {x.data(), points.size()}).nrms);
+    }
+  }
+  std::vector<CalibrationCase> cases;
+  for (const std::size_t n : fitted)
+    cases.push_back({problem.loads[n], {truth[n].begin(), truth[n].begin() + static_cast<std::ptrdiff_t>(points.size())}});
+  CalibrateOptions options;
+  options.grid = {p.grid_x, p.grid_y, p.grid_z};
+  options.shared_grid = p.shared_grid;
+  options.pull = p.pull;
+  options.smooth = p.smooth;
+  options.starts = p.starts;
+  options.samples = p.samples;
+  options.iterations = p.iterations;
+  const Calibration c = calibrate(model, cases, options, context);
+  if (c.after.empty()) throw Error(ExitCode::failed, c.why, "make the loads smaller");
+  Json j{{"osteotome_tissue_constants", 1},
+         {"grid", options.grid},
+         {"order_of_factors", {"axis edges", "diagonal edges", "faces", "volumes"}},
+         {"log_factors", c.log_factors}};
+  if (p.blind) j["base"] = {{"young_kpa", 1000 * problem.general.young_mpa}, {"poisson", problem.general.poisson}};
+  const TissueModel uniform = TissueModel::of_voxels(points, tets, std::span(&problem.general, 1));
+  const std::vector<double> kpa = stiffness_kpa(model, uniform, problem.general);
+  if (problem.materials.size() > 1) j["learnt"] = learnt(problem, model, kpa);
+  if (c.log_stiffness.size() > 1) j["log_stiffness"] = c.log_stiffness;
+  j["uncertainty_of_parameters"] = c.uncertainty;
+  j["converged"] = c.converged;
+  if (!c.why.empty()) j["why"] = c.why;
+  j["parameters"] = c.parameters;
+  j["equilibrium_solves"] = c.solves;
+  j["failed_solves"] = c.failed_solves;
+  j["seconds"] = c.seconds;
+  j["cost"] = c.cost;
+  j["loads"] = Json::list();
+  TissueModel plain = model;
+  plain.scale({1, 1, 0, 1});
+  EquilibriumSolver solver(model, model.rest(), problem.fixed, problem.sliders);
+  Tets deformed;
+  double unseen = 0;
+  for (std::size_t n = 0; n < problem.loads.size(); ++n) {
+    const bool used = std::find(fitted.begin(), fitted.end(), n) != fitted.end();
+    const Equilibrium before = solver.solve(plain, model.rest(), problem.loads[n].forces_n, {}, context);
+    const Equilibrium after = solver.solve(model, model.rest(), problem.loads[n].forces_n, {}, context);
+    if (n == fitted.front()) deformed = moved_mesh(mesh, after.points_mm);
+    const CalibrationError b = calibration_error(points, before.points_mm, truth[n]),
+                           a = calibration_error(points, after.points_mm, truth[n]);
+    j["loads"].push_back({{"name", problem.load_names[n]},
+                          {"fitted", used},
+                          {"truth_rms_mm", a.truth_rms_mm},
+                          {"truth_off_other_order", doubt[n]},
+                          {"closed_form_nrms", b.nrms},
+                          {"nrms", a.nrms},
+                          {"nrms_free_of_rigid", a.nrms_free_of_rigid},
+                          {"rms_mm", a.rms_mm},
+                          {"felt_stiffer_by", force_error(points, after.points_mm, truth[n], problem.loads[n])},
+                          {"at_rest", after.converged}});
+    if (p.check_truth) j["loads"].back()["truth_off_finer"] = doubt_finer[n];
+    if (!used) unseen = std::max(unseen, a.nrms);
+  }
+  context.report("nrms", c.after.front().nrms);
+  context.report("closed_form_nrms", c.before.front().nrms);
+  context.report("worst_nrms_not_fitted", unseen);
+  context.report("truth_off_other_order", doubt[fitted.front()]);
+  if (p.check_truth) context.report("truth_off_finer", doubt_finer[fitted.front()]);
+  context.report("equilibrium_solves", static_cast<std::int64_t>(c.solves));
+  context.progress(1);
+  const std::string title = std::to_string(c.parameters) + " factors in " + std::to_string(c.solves) + " equilibrium solves, " +
+                            format_number(std::round(100 * c.seconds) / 100) + " s: NRMS " +
+                            format_number(std::round(1e4 * c.before.front().nrms) / 1e4) + " to " +
+                            format_number(std::round(1e4 * c.after.front().nrms) / 1e4);
+  return {Document{written(j)}, deformed, stiffness_map(mesh, model, kpa), Document{course_svg(c, title)}};
+}
+
+}  // namespace osteo

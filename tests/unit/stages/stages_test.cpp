@@ -1,0 +1,152 @@
+#include "osteo/stages/mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "meshes.h"
+#include "osteo/base/error.h"
+#include "osteo/data/tet_mesh.h"
+
+namespace osteo {
+namespace {
+
+Data surface(const TriangleSoup& s) {
+  return std::make_shared<const TriMesh>(mesh_of(s));
+}
+Data surface(TriMesh m) {
+  return std::make_shared<const TriMesh>(std::move(m));
+}
+
+template <class T>
+T reported(const Report& report, const std::string& key) {
+  for (const auto& [k, v] : report) {
+    if (k == key) return std::get<T>(v);
+  }
+  ADD_FAILURE() << "nothing is reported as " << key;
+  return {};
+}
+
+nlohmann::json info_of(const Data& d, MeshInfoParams p = {}) {
+  return nlohmann::json::parse(std::get<Document>(MeshInfoStage::run(p, std::span(&d, 1), {})[0]).json);
+}
+
+TEST(MeshInfo, TellsWhatASurfaceIsLike) {
+  const auto box = info_of(surface(test::box({0, 0, 0}, {2, 3, 4})));
+  EXPECT_EQ(box["points"], 8);
+  EXPECT_EQ(box["triangles"], 12);
+  EXPECT_EQ(box["watertight"], true);
+  EXPECT_EQ(box["bodies"], 1);
+  EXPECT_EQ(box["euler_characteristic"], 2);
+  EXPECT_DOUBLE_EQ(box["volume_mm3"], 24);
+  EXPECT_DOUBLE_EQ(box["area_mm2"], 52);
+  EXPECT_EQ(box["bounds_mm"], nlohmann::json({{0, 0, 0}, {2, 3, 4}}));
+
+  TriangleSoup bad = test::joined(test::box({0, 0, 0}, {2, 2, 2}), test::turned(test::box({5, 5, 5}, {6, 6, 6})));
+  bad.triangles.pop_back();
+  const auto worse = info_of(surface(bad));
+  EXPECT_EQ(worse["watertight"], false);
+  EXPECT_EQ(worse["holes"], 1);
+  EXPECT_EQ(worse["open_edges"], 3);
+  EXPECT_EQ(worse["bodies"], 2);
+  EXPECT_FALSE(worse.contains("volume_mm3")) << "an open surface encloses nothing";
+}
+
+TEST(MeshInfo, NoSurfaceIsTooBad) {
+  TriMesh m = mesh_of(test::box({0, 0, 0}, {1, 1, 1}));
+  m.points_mm.push_back({std::nanf(""), 0, 0});
+  m.triangles.push_back({0, 1, 8});
+  m.triangles.push_back({0, 0, 1});
+  const auto j = info_of(surface(m));
+  EXPECT_EQ(j["non_finite_points"], 1);
+  EXPECT_EQ(j["degenerate"], 1);
+  EXPECT_FALSE(j.contains("self_intersections")) << "not to be counted among points that are nowhere";
+}
+
+TEST(MeshRepair, ReportsWhatItDid) {
+  // Loose triangles of a box, one twice, one without area, one wrong way round.
+  TriangleSoup s = test::unwelded(test::box({0, 0, 0}, {2, 2, 2}));
+  std::swap(s.triangles[3][0], s.triangles[3][1]);
+  s.triangles.push_back(s.triangles[5]);
+  s.triangles.push_back({0, 0, 1});
+  const Data in = surface(s);
+  Context context;
+  const auto out = MeshRepairStage::run({}, std::span(&in, 1), context);
+  const Report r = context.take_report();
+  EXPECT_EQ(reported<std::int64_t>(r, "points_welded"), 36 - 8);
+  EXPECT_EQ(reported<std::int64_t>(r, "degenerate_dropped"), 1);
+  EXPECT_EQ(reported<std::int64_t>(r, "duplicates_dropped"), 1);
+  EXPECT_EQ(reported<std::int64_t>(r, "triangles_turned"), 1);
+  EXPECT_TRUE(reported<bool>(r, "watertight"));
+  EXPECT_NEAR(reported<double>(r, "volume_mm3"), 8, 1e-6);
+  EXPECT_EQ(std::get<Surface>(out[0])->triangles.size(), 12u);
+}
+
+TEST(MeshRepair, KeepsTheLargestBodyWhenAsked) {
+  const Data in = surface(test::joined(test::box({0, 0, 0}, {2, 2, 2}), test::box({5, 5, 5}, {6, 6, 6})));
+  MeshRepairParams p;
+  p.keep_largest = true;
+  Context context;
+  const auto out = MeshRepairStage::run(p, std::span(&in, 1), context);
+  EXPECT_NEAR(enclosed_volume_mm3(*std::get<Surface>(out[0])), 8, 1e-6);
+  EXPECT_EQ(reported<std::int64_t>(context.take_report(), "bodies_dropped"), 1);
+}
+
+TEST(Tetrahedralize, EveryMethodFillsTheBall) {
+  const TriangleSoup ball = test::sphere(6, 3, {10, 0, -4});
+  const double volume = enclosed_volume_mm3(mesh_of(ball));
+  const Data in = surface(ball);
+  for (const TetMethod method : {TetMethod::grid, TetMethod::grid_conforming, TetMethod::graded, TetMethod::tetgen, TetMethod::cgal}) {
+    const std::string name(EnumNames<TetMethod>::values[static_cast<std::size_t>(method)]);
+    if (method == TetMethod::cgal && copyleft_parts().find("CGAL") == std::string_view::npos) continue;
+    if (method == TetMethod::tetgen && copyleft_parts().find("TetGen") == std::string_view::npos) continue;
+    SCOPED_TRACE(name);
+    TetrahedralizeParams p;
+    p.method = method;
+    p.spacing_mm = 1.2;
+    p.margin = false;
+    Context context;
+    const auto out = TetrahedralizeStage::run(p, std::span(&in, 1), context);
+    const TetMesh& m = *std::get<Tets>(out[0]);
+    const Report r = context.take_report();
+    const bool stairs = method == TetMethod::grid || method == TetMethod::graded;
+    EXPECT_NEAR(volume_mm3(m), volume, (stairs ? 0.2 : 0.03) * volume);
+    EXPECT_LT(reported<double>(r, "surface_to_boundary_max_mm"), stairs ? 2.1 : 0.4);
+    EXPECT_TRUE(check(boundary_of(m)).watertight());
+  }
+}
+
+TEST(Tetrahedralize, MissingMethodsAndThinSurfacesAreTold) {
+  const Data in = surface(test::box({0, 0, 0}, {10, 10, 0.01}));
+  TetrahedralizeParams p;
+  p.method = TetMethod::grid;
+  p.spacing_mm = 2;
+  EXPECT_THROW(static_cast<void>(TetrahedralizeStage::run(p, std::span(&in, 1), {})), Error);
+  const Data ball = surface(test::sphere(6, 2));
+  for (const auto& [method, part] : {std::pair{TetMethod::tetgen, "TetGen"}, {TetMethod::cgal, "CGAL"}}) {
+    if (copyleft_parts().find(part) != std::string_view::npos) continue;
+    p.method = method;
+    try {
+      static_cast<void>(TetrahedralizeStage::run(p, std::span(&ball, 1), {}));
+      ADD_FAILURE() << part << " is not there";
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find("not in this build"), std::string::npos);
+    }
+  }
+}
+
+TEST(Tetrahedralize, CleanMendsFirst) {
+  TriangleSoup s = test::unwelded(test::sphere(6, 2));
+  std::swap(s.triangles[7][0], s.triangles[7][2]);
+  const Data in = surface(s);
+  TetrahedralizeParams p;
+  p.spacing_mm = 1.5;
+  p.clean = true;
+  Context context;
+  const auto out = TetrahedralizeStage::run(p, std::span(&in, 1), context);
+  EXPECT_EQ(reported<std::int64_t>(context.take_report(), "triangles_turned"), 1);
+  EXPECT_NEAR(volume_mm3(*std::get<Tets>(out[0])), enclosed_volume_mm3(mesh_of(test::sphere(6, 2))), 25);
+}
+
+}  // namespace
+}  // namespace osteo
