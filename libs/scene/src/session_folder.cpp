@@ -97,7 +97,13 @@ std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Cas
 
 World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy, const Context& context) {
   auto [recorded, world] = begin_of(session, the_case, anatomy, context);
-  apply_recorded_until(recorded, world, static_cast<std::uint64_t>(std::llround(t_s * recorded.header().rate_hz)));
+  const double rate_hz = recorded.header().rate_hz;
+  const auto tick = static_cast<std::uint64_t>(std::llround(t_s * rate_hz));
+  if (const std::uint64_t reached = apply_recorded_until(recorded, world, tick); reached < tick)
+    throw Error(ExitCode::usage,
+                "the session '" + session.folder.string() + "' lasts " + format_number(static_cast<double>(reached) / rate_hz) +
+                    " s, not " + format_number(t_s) + " s",
+                "ask for a time within it, or for none: its end");
   return std::move(world);
 }
 

@@ -33,8 +33,8 @@ struct SessionFolder {
 /// Error(corrupt) when it is damaged.
 [[nodiscard]] World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context);
 
-/// The scene at a time of a session, in seconds from its beginning; exact to the tenth of a second that holds it. Error(corrupt) when it is
-/// damaged, or what came before is not all known.
+/// The scene at a time of a session, in seconds from its beginning; exact to the tenth of a second that holds it. Error(usage) behind its
+/// end; Error(corrupt) when it is damaged, or what came before is not all known.
 [[nodiscard]] World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy,
                              const Context& context);
 

@@ -62,7 +62,7 @@ struct SessionPart {
   std::optional<std::uint64_t> checkpoint;  ///< all before this tick has come, and is in the checkpoints up to here
 };
 
-/// An open session. Holds an index of its frames, 48 bytes for each tenth of a second, and no records.
+/// An open session. Holds an index of its frames, 32 bytes for each tenth of a second, and no records.
 class SessionReader {
  public:
   /// Looks through the whole file: all checksums, none of the records. Behind damage it looks for the next whole frame. Errors: no_input,
