@@ -61,7 +61,7 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
   for (std::thread& other : others) {
     other = std::thread([&] {
       for (int n = 0; n < 1000; ++n) {
-        StreamReader& r = stream.add_reader(1 << 13, 1 << 15);
+        StreamReader& r = stream.add_reader(1 << 10, 1 << 12);
         Followed mine;
         for (int looks = 0; looks < 50 && mine.ticks == 0; ++looks) {
           std::this_thread::yield();

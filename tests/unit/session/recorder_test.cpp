@@ -440,7 +440,7 @@ TEST(SessionFile, CheckpointsHoldTheSameSceneInLess) {
     EXPECT_EQ(shorter.moves, all.moves);
   }
   EXPECT_EQ(marks, (std::vector<std::uint64_t>{600, 1200, 1800, 2000}));
-  EXPECT_LT(shorter.changes * 8, all.changes);
+  EXPECT_LT(shorter.changes * 5, all.changes);  // 33 steps, each of which parts what came before from what comes behind
   // Any time: the same as everything up to there.
   for (const std::uint64_t tick : {0, 1, 599, 600, 601, 1199, 1250, 1999, 2000, 5000}) {
     std::uint64_t reached = 0;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -293,13 +294,23 @@ TEST(Records, EveryBitComesBack) {
       file.bytes += size_of(f.type);
     }
     for (const std::size_t n : {1, 2, 257}) {
-      std::vector<std::uint64_t> in(n * table->memory_bytes / 8), out(in.size());
+      std::vector<std::uint64_t> in((n * table->memory_bytes + 7) / 8), out(in.size());
       for (auto& v : in) v = random();
       std::vector<std::byte> bytes;
       put_records(bytes, table->fields, in.data(), n, table->memory_bytes);
       ASSERT_EQ(bytes.size(), n * file.bytes);
       get_records(file, bytes, n, out.data(), table->memory_bytes);
-      EXPECT_EQ(in, out) << table->name << ": every byte of a record belongs to a field";
+      // What no field covers is not written: a change's density before it (4 bytes), an action's hand and padding.
+      std::vector<std::uint8_t> covered(table->memory_bytes);
+      for (const RecordField& f : table->fields) std::fill_n(covered.begin() + f.offset, size_of(f.type), std::uint8_t{1});
+      const auto left_out = static_cast<std::size_t>(std::count(covered.begin(), covered.end(), 0));
+      EXPECT_EQ(left_out, table == &change_table() ? 4U : table == &tick_table() ? 0U : 8U) << table->name;
+      auto* const bytes_in = reinterpret_cast<std::uint8_t*>(in.data());
+      const auto* const bytes_out = reinterpret_cast<const std::uint8_t*>(out.data());
+      std::size_t different = 0;
+      for (std::size_t b = 0; b < n * table->memory_bytes; ++b)
+        different += bytes_out[b] != (covered[b % table->memory_bytes] != 0 ? bytes_in[b] : 0) ? 1 : 0;
+      EXPECT_EQ(different, 0U) << table->name;
     }
   }
 }
