@@ -10,6 +10,7 @@
 #include <deque>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <utility>
 
 #include "mcap_writer.h"
 #include "osteo/base/error.h"
@@ -67,7 +68,7 @@ class OutFile {
   }
   [[noreturn]] void fail() const {
     throw Error(ExitCode::cannot_write, "cannot write '" + shown_.string() + "': " + std::strerror(errno),
-                errno == ENOSPC ? "free some space, or write to another disk" : "choose a folder that you may write to");
+                errno == ENOSPC || errno == EFBIG ? "free some space, or write to another disk" : "choose a folder that you may write to");
   }
   fs::path shown_;
   int fd_ = -1;
@@ -248,6 +249,8 @@ void mcap(Rows rows, OutFile& out) {
 class Hdf5 {
  public:
   explicit Hdf5(const fs::path& path) {
+    // A file that could not be flushed for want of room stays half open in the library, which would crash on it at exit.
+    H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     need(file_ >= 0);
@@ -258,8 +261,8 @@ class Hdf5 {
   Hdf5(const Hdf5&) = delete;
   Hdf5& operator=(const Hdf5&) = delete;
   void close() {
-    need(H5Fclose(file_) >= 0);
-    file_ = -1;
+    // Once: a file that could not be flushed is gone all the same.
+    need(H5Fclose(std::exchange(file_, -1)) >= 0);
   }
   void group(const char* name) {
     const hid_t g = H5Gcreate2(file_, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -508,11 +511,16 @@ void export_session(const SessionReader& session, const fs::path& path, const Co
   };
   Rows rows(session, context);
   if (ending == ".csv") {
-    // All are whole before the first takes its name.
+    // All are whole, and closed, before the first takes its name.
     const auto files = export_files(path);
-    streamed(files[0], [&](OutFile& ticks) {
-      streamed(files[1],
-               [&](OutFile& actions) { streamed(files[2], [&](OutFile& notes) { csv(std::move(rows), ticks, actions, notes); }); });
+    write_atomically(files[0], [&](const fs::path& ticks_file) {
+      write_atomically(files[1], [&](const fs::path& actions_file) {
+        write_atomically(files[2], [&](const fs::path& notes_file) {
+          OutFile ticks(ticks_file, files[0]), actions(actions_file, files[1]), notes(notes_file, files[2]);
+          csv(std::move(rows), ticks, actions, notes);
+          for (OutFile* const out : {&ticks, &actions, &notes}) out->close();
+        });
+      });
     });
   } else if (ending == ".mcap") {
     streamed(path, [&](OutFile& out) { mcap(std::move(rows), out); });

@@ -5,7 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <ctime>
+#include <filesystem>
+#include <iterator>
 #include <random>
 #include <stdexcept>
 #include <thread>
@@ -97,6 +101,22 @@ TEST(Histogram, QuantilesWithinAnEighth) {
   EXPECT_NEAR(h.max_us(), static_cast<double>(all.back()) / 1000, 1e-9);
 }
 
+// The largest value that counts the same: buckets of an eighth of an octave, exact below 16 ns.
+TEST(Histogram, BucketsEndWhereTheyShould) {
+  const auto told_ns = [](std::int64_t value) {
+    Histogram h;
+    h.add(value);
+    h.add(1'000'000);
+    return std::lround(h.quantile_us(0.5) * 1000);
+  };
+  for (std::int64_t v = 0; v < 16; ++v) EXPECT_EQ(told_ns(v), v);
+  EXPECT_EQ(told_ns(16), 17);
+  EXPECT_EQ(told_ns(17), 17);
+  EXPECT_EQ(told_ns(18), 19);
+  EXPECT_EQ(told_ns(1000), 1023);
+  EXPECT_EQ(told_ns(1024), 1151);
+}
+
 std::int64_t thread_cpu_ns() {
   timespec t{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -125,6 +145,7 @@ TEST(Loop, CallsAtItsRateAndCountsMissedPeriods) {
   EXPECT_GE(loop.stats().missed_by_machine, 5u);
   EXPECT_GE(monotonic_ns() - begin, 60'000'000);
   EXPECT_TRUE(loop.stats().realtime_granted || !loop.stats().realtime_refusal.empty());
+  EXPECT_EQ(loop.realtime(), loop.stats().realtime_granted);
 }
 
 TEST(Loop, HandsOverWhatItsFunctionThrows) {
@@ -137,6 +158,23 @@ TEST(Loop, HandsOverWhatItsFunctionThrows) {
   EXPECT_FALSE(loop.running());
   ASSERT_TRUE(loop.failure());
   EXPECT_THROW(std::rethrow_exception(loop.failure()), std::runtime_error);
+}
+
+// The file that keeps cores awake too.
+TEST(Loop, LeavesNoFileOpenAndNoThread) {
+  const auto entries = [](const char* folder) {
+    return std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator());
+  };
+  const auto files = entries("/proc/self/fd"), threads = entries("/proc/self/task");
+  std::atomic<int> calls{0};
+  {
+    FixedRateLoop loop(1000, [&](std::int64_t) { return ++calls > 0; });
+    loop.start();
+    while (calls < 3) std::this_thread::yield();
+    // Nobody waits for it: it ends by itself.
+  }
+  EXPECT_EQ(entries("/proc/self/fd"), files);
+  EXPECT_EQ(entries("/proc/self/task"), threads);
 }
 
 // Memory that may be locked is limited: the loop must not make others run out of it.

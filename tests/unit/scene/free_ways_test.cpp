@@ -319,6 +319,16 @@ TEST(FreeWays, TurnsOnlyAsFarAsTheShaftIsFree) {
   EXPECT_NEAR(pose.axis.x, 1, 1e-6);
 }
 
+// A burr that rests on the floor of a hole touches bone already: the shaft may not touch more.
+TEST(FreeWays, ATouchingToolTurnsOnlyAsFarAsItTouchesNoMore) {
+  const World world = carved({20, 20, 20}, [](Vec3 p) { return p.z < 0 && (std::hypot(p.x, p.y) > 4 || p.z < -12); });
+  const FreeWays whole(world, skin_of_burr(kTool));
+  const HandPose pose{{0, 0, -10.6}, {0, 0, 1}};
+  ASSERT_FALSE(whole.free(pose, 0));
+  const Vec3 axis = whole.turned(pose, {1, 0, 0}, 1);
+  EXPECT_LT(std::acos(axis.z), 0.5);
+}
+
 TEST(FreeWays, WaitsInFreeAirWhereverOneLooksFrom) {
   const World world = carved({30, 10, 20}, [](Vec3) { return true; });
   const FreeWays ways(world, skin_of_burr(kTool));
