@@ -41,7 +41,8 @@ void repeat(const osteo::SessionReader& session, double minutes, const std::file
   }
   writer.finish({next, "", "", 0, "", 0, 0});
   std::printf("%.1f minutes, %.1f MB: %.2f MB a minute\n", static_cast<double>(next) / header.rate_hz / 60,
-              static_cast<double>(writer.bytes()) / 1e6, static_cast<double>(writer.bytes()) / 1e6 / (static_cast<double>(next) / header.rate_hz / 60));
+              static_cast<double>(writer.bytes()) / 1e6,
+              static_cast<double>(writer.bytes()) / 1e6 / (static_cast<double>(next) / header.rate_hz / 60));
 }
 
 // By the clock, and of this process alone: other programs take their share of a busy machine.
@@ -58,7 +59,9 @@ struct Times {
   void print(const char* what) {
     std::sort(wall_s.begin(), wall_s.end());
     std::sort(own_s.begin(), own_s.end());
-    const auto at = [](const std::vector<double>& v, double share) { return v[static_cast<std::size_t>(share * static_cast<double>(v.size() - 1))]; };
+    const auto at = [](const std::vector<double>& v, double share) {
+      return v[static_cast<std::size_t>(share * static_cast<double>(v.size() - 1))];
+    };
     std::printf("%s: median %.2f s, p95 %.2f s; of that its own %.2f s, %.2f s\n", what, at(wall_s, 0.5), at(wall_s, 0.95), at(own_s, 0.5),
                 at(own_s, 0.95));
   }

@@ -514,12 +514,12 @@ void export_session(const SessionReader& session, const fs::path& path, const Co
   if (ending == ".csv") {
     // All are whole, and closed, before the first takes its name.
     const auto files = export_files(path);
-    streamed(files[0], [&](OutFile& ticks) {
-      streamed(files[1], [&](OutFile& actions) {
-        streamed(files[2], [&](OutFile& notes) {
+    write_atomically(files[0], [&](const fs::path& ticks_file) {
+      write_atomically(files[1], [&](const fs::path& actions_file) {
+        write_atomically(files[2], [&](const fs::path& notes_file) {
+          OutFile ticks(ticks_file, files[0]), actions(actions_file, files[1]), notes(notes_file, files[2]);
           csv(std::move(rows), ticks, actions, notes);
-          ticks.close();
-          actions.close();
+          for (OutFile* const out : {&ticks, &actions, &notes}) out->close();
         });
       });
     });

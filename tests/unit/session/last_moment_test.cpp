@@ -44,7 +44,7 @@ TEST(Recorder, EndsWithASyncOfAllThatWasWritten) {
       t.tick = n;
       reader.ticks.push(t);
     }
-    recorder.finish({5, "abc", "", 0, "", 0});
+    recorder.finish({5, "abc", "", 0, "", 0, 0});
   }
   ASSERT_GE(heard.size(), 3u);
   EXPECT_EQ(heard.back(), 's') << heard;
