@@ -332,9 +332,9 @@ class Reading {
   // The last ticks of a file that was cut before their changes.
   void cut() {
     if (s_.end || unchanged_from_ == kNone) return;
-    s_.torn_ticks = s_.ticks.size() - unchanged_from_;
-    s_.ticks.resize(unchanged_from_);
-    while (!s_.ticks.empty() && s_.ticks.back().hand + 1 != s_.header.haptics.hands()) s_.ticks.pop_back();
+    const std::size_t hands = s_.header.haptics.hands(), kept = unchanged_from_ / hands * hands;
+    s_.torn_ticks = (s_.ticks.size() - kept) / hands;
+    s_.ticks.resize(kept);
     for (Gap& g : s_.gaps) g.ticks_before = std::min(g.ticks_before, s_.ticks.size());
   }
 
