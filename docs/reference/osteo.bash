@@ -30,6 +30,7 @@ _osteo() {
     "rehearse --shape") COMPREPLY=($(compgen -W "ball cylinder taper " -- "$cur")); return ;;
     "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
     "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics " -- "$cur")); return ;;
+    "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"

@@ -112,7 +112,7 @@ TEST(Servo, TellsWhenAStrokeEnds) {
   HapticSetup setup;
   setup.device = SpringHand::traits();
   HapticRenderer renderer(setup, bone, {}, 1e-3);
-  Script s;
+  Strokes s;
   s.axis = {0, 0, 1};
   // Down, up for 0.2 s (the same stroke), down again, up.
   s.waypoints = {{0, {0, 0, 6}, true},     {0.3, {0, 0, 1.7}, true}, {0.5, {0, 0, 1.5}, true},

@@ -468,7 +468,7 @@ TEST(HapticSettings, ErrorsSayFileAndLine) {
                                       {"\"stiffness_n_per_mm\": \"2\"", "must be a number"},
                                       {"\"hardness\": 1", "must be true, false or"},
                                       {"\"method\": \"magic\"", "'magic' is not one of"},
-                                      {"\"tools\": { \"wooden\": \"proxy\" }", "no burr is a \"wooden\""},
+                                      {"\"tools\": { \"wooden\": \"proxy\" }", "no instrument is a \"wooden\""},
                                       {"\"tools\": { \"diamond\": 3 }", "\"diamond\" must be a text"},
                                       {"\"tools\": []", "must be an object"},
                                       {"\"stiffness_n_per_mm\": }", "not valid JSON"}}) {
