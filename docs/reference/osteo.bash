@@ -67,7 +67,7 @@ _osteo() {
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline --fresh" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --dust --rate-hz --resume --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     devices) flags="$flags --watch --recording" ;;
