@@ -256,14 +256,6 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
     good = decode_with_gdcm(h, in, take);
   }
   if (!good) throw PixelError("its compressed pixels are damaged");
-  // Codecs leave the bits above the sign bit as they please.
-  const int sign = h.bits_stored - 1;
-  if (h.is_signed && sign > 0 && sign < 15) {
-    for (auto& v : values) {
-      const int low = v & ((2 << sign) - 1);
-      v = static_cast<std::uint16_t>(low >> sign != 0 ? low - (2 << sign) : low);
-    }
-  }
   return values;
 }
 

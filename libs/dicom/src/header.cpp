@@ -126,6 +126,9 @@ std::optional<int> read_padding(const vtkDICOMValue& value, const DicomHeader& h
   if (!value.IsValid() || value.GetNumberOfValues() == 0) return {};
   int v = value.AsInt();
   if (h.bits_allocated == 16) v = h.is_signed ? static_cast<std::int16_t>(v) : static_cast<std::uint16_t>(v);
+  // As the pixels may be, it may be a negative number whose sign is not extended.
+  if (h.is_signed && h.bits_stored > 1 && h.bits_stored < 16 && v >= 1 << (h.bits_stored - 1) && v < 1 << h.bits_stored)
+    v -= 1 << h.bits_stored;
   return v;
 }
 
@@ -221,8 +224,10 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.is_signed = meta->Get(DC::PixelRepresentation).AsInt() != 0;
   h.inverted = text_of(meta, DC::PhotometricInterpretation) == "MONOCHROME1";
   for (unsigned short group = 0x6000; group <= 0x601E; group = static_cast<unsigned short>(group + 2)) {
-    const vtkDICOMValue& bit = meta->Get(vtkDICOMTag(group, 0x0102));
-    if (bit.IsValid() && bit.AsInt() > h.high_bit) h.overlay_in_pixels = true;
+    const vtkDICOMValue &bit = meta->Get(vtkDICOMTag(group, 0x0102)), &bits = meta->Get(vtkDICOMTag(group, 0x0100));
+    if (!bit.IsValid()) continue;
+    const bool below = bits.AsInt() == h.bits_allocated && bit.AsInt() <= h.high_bit - h.bits_stored;
+    if (bit.AsInt() > h.high_bit || below) h.overlay_in_pixels = true;
   }
   h.padding = read_padding(meta->Get(DC::PixelPaddingValue), h);
   h.padding_limit = read_padding(meta->Get(DC::PixelPaddingRangeLimit), h);

@@ -19,17 +19,69 @@ constexpr double kPaddingBelowHu = -1200;
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
 
-// Keeps the bits of the pixel where others hold an overlay.
+// The values of words: BitsStored bits up to HighBit, with their sign extended; what lies around them is no part of a pixel, and a file
+// need not extend the sign (PS3.5 8.1.1, C.7.6.3.1.2). Two errors of files are told from that by the pixels themselves: a HighBit that
+// leaves out bits which are in use, and a BitsStored that the values exceed.
 template <class T>
-void remove_overlay(const DicomHeader& h, T* p, std::size_t n) {
-  if (!h.overlay_in_pixels || h.bits_stored <= 0 || h.bits_stored >= static_cast<int>(8 * sizeof(T)) || h.high_bit + 1 < h.bits_stored)
-    return;
-  const int shift = h.high_bit + 1 - h.bits_stored;
-  const unsigned mask = (1U << h.bits_stored) - 1, sign = 1U << (h.bits_stored - 1);
-  for (std::size_t i = 0; i < n; ++i) {
-    const unsigned v = (static_cast<unsigned>(static_cast<std::make_unsigned_t<T>>(p[i])) >> shift) & mask;
-    p[i] = static_cast<T>(h.is_signed && (v & sign) != 0 ? v | ~mask : v);
+void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& count) {
+  static_assert(std::is_unsigned_v<T>);
+  constexpr int kBits = 8 * sizeof(T);
+  const int stored = h.bits_stored;
+  if (stored <= 0 || stored >= kBits || h.high_bit >= kBits || h.high_bit + 1 < stored) return;
+  const T mask = static_cast<T>((T{1} << stored) - 1), sign = static_cast<T>(T{1} << (stored - 1));
+  const auto extended = [&](T v) { return static_cast<T>(h.is_signed && (v & sign) != 0 ? v | static_cast<T>(~mask) : v & mask); };
+
+  const int shift = h.high_bit + 1 - stored;
+  if (shift > 0) {
+    const T below = static_cast<T>((T{1} << shift) - 1);
+    bool in_use = false;
+    for (std::size_t i = 0; i < n && !h.overlay_in_pixels; ++i) in_use = in_use || (p[i] & below) != 0;
+    if (!in_use) {
+      for (std::size_t i = 0; i < n; ++i) p[i] = extended(static_cast<T>(p[i] >> shift));
+      return;
+    }
+    ++count.high_bit_wrong;
   }
+  T odd = 0;
+  for (std::size_t i = 0; i < n; ++i) odd = static_cast<T>(odd | (p[i] ^ extended(p[i])));
+  if (odd == 0) return;
+
+  // Padding that its tag gives in more bits than are stored is no value either way.
+  const auto is_padding = [&](T word) {
+    if (!h.padding) return false;
+    const auto v = static_cast<std::int64_t>(h.is_signed ? static_cast<std::int64_t>(static_cast<std::make_signed_t<T>>(word))
+                                                         : static_cast<std::int64_t>(word));
+    const int end = h.padding_limit.value_or(*h.padding);
+    return v >= std::min(*h.padding, end) && v <= std::max(*h.padding, end);
+  };
+  const auto number = [&](T word) {
+    return h.is_signed ? static_cast<double>(static_cast<std::make_signed_t<T>>(word)) : static_cast<double>(word);
+  };
+  // Pictures change less from pixel to pixel than bits that do not belong to them do.
+  double by_tags = 0, by_words = 0;
+  const auto columns = static_cast<std::size_t>(h.columns);
+  std::uint64_t changed = 0, unextended = 0, too_low = 0;
+  const std::size_t most = h.overlay_in_pixels ? 0 : n;
+  for (std::size_t i = 0; i < most; ++i) {
+    const T w = p[i], v = extended(w);
+    changed += w != v ? 1 : 0;
+    unextended += w != v && static_cast<T>(w & static_cast<T>(~mask)) == 0 ? 1 : 0;
+    too_low += w != v && h.is_signed && static_cast<T>(w | mask) == static_cast<T>(~T{0}) ? 1 : 0;
+    if (i % columns == 0 || (w == v && p[i - 1] == extended(p[i - 1])) || is_padding(w) || is_padding(p[i - 1])) continue;
+    by_tags += std::abs(number(v) - number(extended(p[i - 1])));
+    by_words += std::abs(number(w) - number(p[i - 1]));
+  }
+  // Negative numbers whose sign is extended, but from further up.
+  const bool all_too_low = too_low > 0 && too_low == changed;
+  if (all_too_low || by_words < 0.5 * by_tags) {
+    count.bits_exceeded += changed;
+    return;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!is_padding(p[i])) p[i] = extended(p[i]);
+  }
+  count.sign_not_extended += unextended;
+  count.bits_foreign += changed - unextended;
 }
 
 class Converter {
@@ -152,6 +204,10 @@ void ValueCount::add(const ValueCount& o) {
   out_of_range += o.out_of_range;
   saturated += o.saturated;
   metal += o.metal;
+  high_bit_wrong += o.high_bit_wrong;
+  sign_not_extended += o.sign_not_extended;
+  bits_foreign += o.bits_foreign;
+  bits_exceeded += o.bits_exceeded;
   padding_hu = std::min(padding_hu, o.padding_hu);
   fractional = fractional || o.fractional;
   if (histogram.empty()) histogram.assign(kBins, 0);
@@ -167,7 +223,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     const CompressedFrames frames(h);
     for (const FrameTarget& t : targets) {
       std::vector<std::uint16_t> stored = frames.decode(t.frame);
-      remove_overlay(h, stored.data(), n);
+      // What codecs leave above the sign bit says nothing of the file.
+      ValueCount ignored;
+      take_stored_bits(h, stored.data(), n, ignored);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int16_t*>(stored.data()));
       } else {
@@ -181,6 +239,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     if (h.bits_allocated == 8) {
       std::vector<std::uint8_t> stored(n);
       read_bytes(h, offset, stored.data(), n);
+      take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int8_t*>(stored.data()));
       } else {
@@ -192,6 +251,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
       std::vector<std::uint32_t> stored(n);
       read_bytes(h, offset, stored.data(), n * 4);
       if (h.big_endian) std::transform(stored.begin(), stored.end(), stored.begin(), [](std::uint32_t v) { return __builtin_bswap32(v); });
+      take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int32_t*>(stored.data()));
       } else {
@@ -203,7 +263,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     read_bytes(h, offset, t.out, n * 2);
     auto* const words = reinterpret_cast<std::uint16_t*>(t.out);
     if (h.big_endian) std::transform(words, words + n, words, [](std::uint16_t v) { return __builtin_bswap16(v); });
-    remove_overlay(h, t.out, n);
+    take_stored_bits(h, words, n, count);
     if (h.is_signed) {
       convert(t, t.out);
     } else {

@@ -45,6 +45,28 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
     v.add(code::values_rounded, Severity::info, "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
   }
 
+  if (count.sign_not_extended > 0) {
+    v.add(
+        code::sign_not_extended, Severity::info,
+        "the sign of " + std::to_string(count.sign_not_extended) + " negative pixels is not extended above their stored bits; it is here");
+  }
+  if (count.bits_foreign > 0) {
+    v.add(code::bits_foreign, Severity::info,
+          std::to_string(count.bits_foreign) + " pixels have other bits above HighBit, such as an overlay; they are cleared");
+  }
+  if (count.bits_exceeded > 0) {
+    v.add(code::bits_stored_wrong, Severity::warning,
+          std::to_string(count.bits_exceeded) +
+              " pixels need more bits than the file says it stores (BitsStored), and fit their neighbours only with these: whole words are "
+              "taken",
+          "compare with the scanner's own pictures, near metal above all");
+  }
+  if (count.high_bit_wrong > 0) {
+    v.add(code::high_bit_wrong, Severity::warning,
+          "the file says that the lowest bits belong to no pixel (HighBit), but they are in use: the lowest BitsStored bits are taken",
+          "compare with the scanner's own pictures");
+  }
+
   const double pixels = std::max<double>(1, static_cast<double>(count.pixels));
   c.padding_share = static_cast<double>(count.by_tag + count.found) / pixels;
   c.padding_hu = count.padding_hu;

@@ -584,5 +584,107 @@ TEST(HardCase, C24_WithoutPreambleAndMeta) {
   }
 }
 
+// Each pixel stored anew as word(HU), with the tags that say how.
+void store_as(Series& s, const std::function<Uint16(int hu, std::size_t at)>& word, int bits_stored, int high_bit, bool is_signed,
+              int intercept) {
+  s.edit_all([&](DcmDataset& d, int) {
+    const Uint16* read = nullptr;
+    unsigned long count = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+    Float64 offset = 0;
+    d.findAndGetFloat64(DCM_RescaleIntercept, offset);
+    Uint16 was_signed = 0;
+    d.findAndGetUint16(DCM_PixelRepresentation, was_signed);
+    std::vector<Uint16> pixels(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const int stored = was_signed != 0 ? static_cast<std::int16_t>(read[i]) : static_cast<int>(read[i]);
+      pixels[i] = word(std::max(-1024, stored + static_cast<int>(offset)), i);
+    }
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+    d.putAndInsertUint16(DCM_PixelRepresentation, is_signed ? 1 : 0);
+    d.putAndInsertUint16(DCM_BitsStored, static_cast<Uint16>(bits_stored));
+    d.putAndInsertUint16(DCM_HighBit, static_cast<Uint16>(high_bit));
+    d.findAndDeleteElement(DCM_PixelPaddingValue);
+    put(d, DCM_RescaleIntercept, std::to_string(intercept));
+    put(d, DCM_RescaleSlope, "1");
+  });
+}
+
+void expect_same_voxels(const Image& a, const Image& b) {
+  ASSERT_EQ(a.frame.voxel_count(), b.frame.voxel_count());
+  std::size_t other = 0;
+  for (std::size_t i = 0; i < a.frame.voxel_count(); ++i) other += a.voxels[i] != b.voxels[i] ? 1 : 0;
+  EXPECT_EQ(other, 0u);
+}
+
+TEST(HardCase, C25_SignedPixelsWithoutTheirSignExtended) {
+  const auto low = [](int hu) { return std::min(hu, 2047); };
+  Series plain("c25-plain", slices(0, 12)), bare("c25", slices(0, 12)), padded("c25-padded", slices(0, 12));
+  store_as(
+      plain, [&](int hu, std::size_t) { return static_cast<Uint16>(low(hu)); }, 12, 11, true, 0);
+  store_as(
+      bare, [&](int hu, std::size_t) { return static_cast<Uint16>(low(hu) & 0xFFF); }, 12, 11, true, 0);
+  const Imported wanted = load(plain.folder), got = load(bare.folder);
+  EXPECT_FALSE(wanted.verdict.has(code::sign_not_extended));
+  EXPECT_TRUE(got.verdict.has(code::sign_not_extended));
+  EXPECT_LT(got.verdict.values.hu_min, -900);
+  EXPECT_TRUE(got.verdict.values.plausible);
+  expect_same_voxels(wanted.image, got.image);
+  // Its padding is given in the same way, and as a number that 12 bits do not hold.
+  for (const int padding : {-2000, -3024}) {
+    store_as(
+        padded,
+        [&](int hu, std::size_t i) { return static_cast<Uint16>(i < 5000 ? (padding == -2000 ? padding & 0xFFF : padding) : low(hu)); }, 12,
+        11, true, 0);
+    padded.edit_all([&](DcmDataset& d, int) {
+      d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(padding == -2000 ? padding & 0xFFF : padding));
+    });
+    const Imported p = load(padded.folder);
+    EXPECT_TRUE(p.verdict.has(code::padding_tag)) << padding;
+    EXPECT_EQ(p.verdict.values.padding_hu, padding);
+    EXPECT_EQ(p.image.voxels[100], -1024);
+    EXPECT_EQ(p.image.voxels[5001], got.image.voxels[5001]);
+  }
+  // No tag names it: negative numbers of more than 12 bits are still that, and no bone of 1072 HU.
+  padded.edit_all([](DcmDataset& d, int) { d.findAndDeleteElement(DCM_PixelPaddingValue); });
+  const Imported untold = load(padded.folder);
+  EXPECT_TRUE(untold.verdict.has(code::bits_stored_wrong));
+  EXPECT_EQ(untold.image.voxels[100], -1024);
+}
+
+TEST(HardCase, C26_OtherBitsAroundThoseOfThePixel) {
+  Series plain("c26-plain", slices(0, 12)), above("c26-above", slices(0, 12)), left("c26-left", slices(0, 12)),
+      wrong("c26-wrong", slices(0, 12)), metal("c26-metal", slices(0, 12));
+  const auto word = [](int hu) { return std::min(hu + 1024, 4095); };
+  const auto columns = static_cast<std::size_t>(load(plain.folder).image.frame.dims[0]);
+  store_as(
+      plain, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu)); }, 12, 11, false, -1024);
+  const Imported wanted = load(plain.folder);
+  // Garbage above HighBit.
+  store_as(
+      above, [&](int hu, std::size_t i) { return static_cast<Uint16>(word(hu) | ((i * 2654435761U >> 7 & 15U) << 12)); }, 12, 11, false,
+      -1024);
+  const Imported cleared = load(above.folder);
+  EXPECT_TRUE(cleared.verdict.has(code::bits_foreign));
+  expect_same_voxels(wanted.image, cleared.image);
+  // The pixel in the upper bits of its word.
+  store_as(
+      left, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu) << 4); }, 12, 15, false, -1024);
+  expect_same_voxels(wanted.image, load(left.folder).image);
+  // A HighBit that is wrong.
+  store_as(
+      wrong, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu)); }, 12, 15, false, -1024);
+  const Imported guessed = load(wrong.folder);
+  EXPECT_TRUE(guessed.verdict.has(code::high_bit_wrong));
+  expect_same_voxels(wanted.image, guessed.image);
+  // A BitsStored that metal exceeds, with edges as blurred as a scanner's: 5600 and not 1504.
+  store_as(
+      metal, [&](int hu, std::size_t i) { return static_cast<Uint16>(std::max(word(hu), 5600 - 200 * std::abs(int(i % columns) - 20))); },
+      12, 11, false, -1024);
+  const Imported kept = load(metal.folder);
+  EXPECT_TRUE(kept.verdict.has(code::bits_stored_wrong));
+  EXPECT_EQ(kept.image.voxels[20], 4576);
+}
+
 }  // namespace
 }  // namespace osteo

@@ -40,7 +40,7 @@ struct DicomHeader {
   int columns = 0, rows = 0, samples = 1;
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false, inverted = false;  ///< inverted: MONOCHROME1
-  bool overlay_in_pixels = false;            ///< bits above high_bit hold an overlay
+  bool overlay_in_pixels = false;            ///< bits around those of the pixel hold an overlay
   std::optional<int> padding, padding_limit;
   bool compressed = false, big_endian = false;
   std::uint64_t pixel_offset = 0;  ///< first byte of uncompressed pixels

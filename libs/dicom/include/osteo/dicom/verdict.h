@@ -33,7 +33,9 @@ inline constexpr std::string_view not_ct = "NOT_CT", not_a_volume = "NOT_A_VOLUM
 inline constexpr std::string_view padding_tag = "PADDING_TAG", padding_found = "PADDING_FOUND", padding_tag_wrong = "PADDING_TAG_WRONG",
                                   monochrome1 = "MONOCHROME1", saturated = "SATURATED", metal = "METAL", values_rounded = "VALUES_ROUNDED",
                                   values_out_of_range = "VALUES_OUT_OF_RANGE", hu_wrong_sign = "HU_WRONG_SIGN", hu_shifted = "HU_SHIFTED",
-                                  hu_scaled = "HU_SCALED", not_hu = "NOT_HU", no_air = "NO_AIR", lossy = "LOSSY";
+                                  hu_scaled = "HU_SCALED", not_hu = "NOT_HU", no_air = "NO_AIR", lossy = "LOSSY",
+                                  sign_not_extended = "SIGN_NOT_EXTENDED", bits_foreign = "BITS_FOREIGN",
+                                  bits_stored_wrong = "BITS_STORED_WRONG", high_bit_wrong = "HIGH_BIT_WRONG";
 }  // namespace code
 
 enum class Severity { info, warning, error };
