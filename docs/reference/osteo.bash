@@ -59,7 +59,7 @@ _osteo() {
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
-    series) flags="$flags" ;;
+    series) flags="$flags --studies" ;;
     guide) flags="$flags" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;

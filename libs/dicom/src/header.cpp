@@ -92,6 +92,17 @@ std::vector<std::string> identifying_values(vtkDICOMMetaData* meta) {
   return values;
 }
 
+// Spelling that means nothing: case, and the empty parts at a name's end.
+std::string patient_of(vtkDICOMMetaData* meta) {
+  std::string all;
+  for (const auto tag : {DC::PatientID, DC::IssuerOfPatientID, DC::PatientName, DC::PatientBirthDate}) {
+    std::string text = lower_case(text_of(meta, tag));
+    while (!text.empty() && (text.back() == '^' || text.back() == ' ' || text.back() == '=')) text.pop_back();
+    all += text + '\n';
+  }
+  return all;
+}
+
 bool read_vec(const vtkDICOMValue& value, std::size_t at, Vec3& out) {
   if (value.GetNumberOfValues() < at + 3) return false;
   out = {value.GetDouble(at), value.GetDouble(at + 1), value.GetDouble(at + 2)};
@@ -201,6 +212,9 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.series_uid = text_of(meta, DC::SeriesInstanceUID);
   h.study_uid = text_of(meta, DC::StudyInstanceUID);
   h.frame_of_reference_uid = text_of(meta, DC::FrameOfReferenceUID);
+  h.patient = patient_of(meta);
+  h.study_date = text_of(meta, DC::StudyDate);
+  h.study_description = text_of(meta, DC::StudyDescription);
   h.identifying = identifying_values(meta);
   h.modality = text_of(meta, DC::Modality);
   h.image_type = trimmed(meta->Get(DC::ImageType).AsString());

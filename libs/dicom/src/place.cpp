@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "osteo/base/param.h"
 
@@ -157,8 +158,7 @@ class Placer {
     const auto number = [](int n) { return std::string(10 - std::min<std::size_t>(9, std::to_string(n).size()), ' ') + std::to_string(n); };
     for (const Parts& parts :
          {by([&](const DicomHeader& h) { return number(h.acquisition); }), by([](const DicomHeader& h) { return h.temporal; }),
-          by([](const DicomHeader& h) { return h.image_type; }), by([](const DicomHeader& h) { return h.kernel; }),
-          by([](const DicomHeader& h) { return h.frame_of_reference_uid; })}) {
+          by([](const DicomHeader& h) { return h.image_type; }), by([](const DicomHeader& h) { return h.kernel; })}) {
       if (parts.size() < 2) continue;
       const bool clean = std::none_of(parts.begin(), parts.end(), [](const auto& p) { return has_conflict(p.second); });
       if (!clean) continue;
@@ -335,6 +335,14 @@ class Placer {
     compare_tags(h);
     if (stack.size() < 10) {
       v.add(code::few_slices, Severity::warning, "there are only " + std::to_string(stack.size()) + " slices");
+    }
+    std::set<std::string> spaces;
+    for (const Candidate& c : stack) spaces.insert(headers_[c.header].frame_of_reference_uid);
+    spaces.erase("");
+    if (spaces.size() > 1) {
+      v.add(code::frame_of_reference_wrong, Severity::warning,
+            "each of the slices names a frame of reference of its own, as careless anonymisation leaves them; they are taken as one scan",
+            "see that all slices are of one patient and one scan");
     }
     if (h.inverted) {
       v.add(code::monochrome1, Severity::info,

@@ -42,6 +42,14 @@ Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options
   if (p.verdict.series == 0) p.verdict.series = series.number;
   if (p.verdict.modality.empty()) p.verdict.modality = series.modality;
   if (series.strays) p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
+  if (!series.foreign.empty()) {
+    p.verdict.add(code::several_scans, Severity::warning,
+                  "the series also holds " + std::to_string(series.foreign.size()) +
+                      " slices of another patient, study or frame of reference ('" + series.foreign.front() + "', ...); they are left out",
+                  "'osteo import --list FOLDER' shows which belong together", series.foreign);
+    for (const std::string& f : series.foreign)
+      p.verdict.set_aside.push_back({f, std::string(code::several_scans), "it is of another patient, study or frame of reference"});
+  }
   p.verdict.why_chosen = series.recommended ? series.why : "asked for";
   if (p.verdict.refused()) throw Refused(p.verdict);
   return p;

@@ -686,5 +686,80 @@ TEST(HardCase, C26_OtherBitsAroundThoseOfThePixel) {
   EXPECT_EQ(kept.image.voxels[20], 4576);
 }
 
+std::string asked(const fs::path& folder, const std::string& series = {}) {
+  ImportParams params;
+  params.series = series;
+  try {
+    return "taken " + std::to_string(load(folder, params).verdict.slices.size());
+  } catch (const Error& e) {
+    return std::to_string(static_cast<int>(e.code())) + " " + e.what() + " " + e.advice();
+  }
+}
+
+void of_another(DcmDataset& d, const DcmTagKey& tag, const char* value) {
+  put(d, tag, value);
+  OFString uid;
+  d.findAndGetOFString(DCM_SOPInstanceUID, uid);
+  put(d, DCM_SOPInstanceUID, std::string(uid.c_str()) + ".7");
+}
+
+// Two patients, studies or frames of reference, each under its own series UID or under one: never one of them without a word.
+TEST(HardCase, C27_ScansThatDoNotBelongTogether) {
+  for (const bool one_series : {false, true}) {
+    for (const auto& [tag, value, said, scans] :
+         {std::tuple{DCM_PatientID, "SOMEBODY ELSE", "2 patients", std::pair{"A1a", "B1a"}},
+          std::tuple{DCM_StudyInstanceUID, "1.2.3.99", "2 studies", std::pair{"A1a", "A2a"}},
+          std::tuple{DCM_FrameOfReferenceUID, "1.2.3.98", "different frames of reference", std::pair{"A1a", "A1b"}}}) {
+      SCOPED_TRACE(std::string(said) + (one_series ? " in one series" : ""));
+      Series s("c27", slices(0, 32));
+      s.edit_all([&](DcmDataset& d, int i) {
+        if (i < 20) return;
+        of_another(d, tag, value);
+        if (!one_series) put(d, DCM_SeriesInstanceUID, "1.2.3.97");
+      });
+      const std::string no_choice = asked(s.folder);
+      EXPECT_EQ(no_choice.substr(0, 2), "4 ") << no_choice;
+      EXPECT_NE(no_choice.find(said), std::string::npos) << no_choice;
+      EXPECT_EQ(no_choice.find("SOMEBODY"), std::string::npos) << no_choice;
+      EXPECT_EQ(asked(s.folder, scans.first), "taken 20");
+      EXPECT_EQ(asked(s.folder, scans.second), "taken 12");
+      const DicomScan scan = scan_dicom(s.folder);
+      EXPECT_EQ(scan.series.size(), 2u);
+      EXPECT_EQ(asked(s.folder, std::string(scans.second) + ":" + std::to_string(scan.series[1].number)), "taken 12");
+      EXPECT_EQ(asked(s.folder, std::to_string(scan.series[1].number)).substr(0, 2), "2 ");
+      ImportParams first;
+      first.series = scans.first;
+      const Verdict v = load(s.folder, first).verdict;
+      EXPECT_EQ(v.has(code::several_scans), one_series);
+      EXPECT_EQ(std::count_if(v.set_aside.begin(), v.set_aside.end(), [](const auto& f) { return f.code == code::several_scans; }),
+                one_series ? 12 : 0);
+    }
+  }
+  // One slice of somebody else makes no scan: it is left out, by name.
+  Series stray("c27-stray", slices(0, 20));
+  stray.edit("010", [](DcmDataset& d) { of_another(d, DCM_PatientID, "SOMEBODY ELSE"); });
+  const Verdict v = load(stray.folder).verdict;
+  EXPECT_TRUE(v.has(code::several_scans));
+  EXPECT_TRUE(v.has(code::slices_missing));
+  EXPECT_EQ(v.slices.size(), 19u);
+}
+
+// What only looks like several scans: a name spelled differently, a frame of reference for each slice, or none in some.
+TEST(HardCase, C27_OneScanThatLooksLikeSeveral) {
+  Series spelled("c27-spelled", slices(0, 20));
+  spelled.edit_all([](DcmDataset& d, int i) { put(d, DCM_PatientName, i % 2 == 0 ? "Doe^Jane" : "DOE^JANE^^"); });
+  EXPECT_EQ(asked(spelled.folder), "taken 20");
+  Series bare("c27-bare", slices(0, 20));
+  bare.edit_all([](DcmDataset& d, int i) {
+    if (i % 3 == 0) d.findAndDeleteElement(DCM_FrameOfReferenceUID);
+  });
+  EXPECT_EQ(load(bare.folder).verdict.status(), "good");
+  Series careless("c27-careless", slices(0, 20));
+  careless.edit_all([](DcmDataset& d, int i) { put(d, DCM_FrameOfReferenceUID, "1.2.3." + std::to_string(i)); });
+  const Imported r = load(careless.folder);
+  EXPECT_TRUE(r.verdict.has(code::frame_of_reference_wrong));
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+}
+
 }  // namespace
 }  // namespace osteo

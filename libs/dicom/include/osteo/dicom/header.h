@@ -29,7 +29,9 @@ struct DicomHeader {
 
   // Of use for grouping only; never written anywhere.
   std::string series_uid, sop_uid, study_uid, frame_of_reference_uid;
-  std::vector<std::string> identifying;  ///< values that name the patient, the people or the place, lower case
+  std::string patient;                        ///< name, number and birth date as one text, the same for all files of a person
+  std::string study_date, study_description;  ///< shown on request only
+  std::vector<std::string> identifying;       ///< values that name the patient, the people or the place, lower case
 
   std::string sop_class, modality, image_type, description, kernel, manufacturer, transfer_syntax;
   int series_number = 0, acquisition = 0, instance = 0;

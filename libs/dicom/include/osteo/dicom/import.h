@@ -37,7 +37,8 @@ void tell_verdict(const Verdict& verdict, const Context& context);
 struct ImportStage {
   using Params = ImportParams;
   static void describe(Params& p, auto& visit) {
-    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
+    visit({"series", "DICOM series to take, by number, UID, or scan as --list shows it, like A1a or A1a:203 (empty: the recommended one)"},
+          p.series);
     visit({"stack", "which stack of a series that holds several (0: the best)", "", 0, 1000}, p.stack);
     visit({"max_gap_mm", "widest usual distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
     visit({"max_hole_mm", "widest distance that is interpolated where slices are missing", "mm", 0, 50}, p.max_hole_mm);

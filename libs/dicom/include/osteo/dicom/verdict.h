@@ -28,7 +28,8 @@ inline constexpr std::string_view not_ct = "NOT_CT", not_a_volume = "NOT_A_VOLUM
                                   gap_too_wide = "GAP_TOO_WIDE", slices_missing = "SLICES_MISSING", hole_too_wide = "HOLE_TOO_WIDE",
                                   gaps_uneven = "GAPS_UNEVEN", tilted = "TILTED", shifted_sideways = "SHIFTED_SIDEWAYS",
                                   several_stacks = "SEVERAL_STACKS", few_slices = "FEW_SLICES", tilt_tag_wrong = "TILT_TAG_WRONG",
-                                  spacing_tag_wrong = "SPACING_TAG_WRONG";
+                                  spacing_tag_wrong = "SPACING_TAG_WRONG", several_scans = "SEVERAL_SCANS",
+                                  frame_of_reference_wrong = "FRAME_OF_REFERENCE_WRONG";
 // The values.
 inline constexpr std::string_view padding_tag = "PADDING_TAG", padding_found = "PADDING_FOUND", padding_tag_wrong = "PADDING_TAG_WRONG",
                                   monochrome1 = "MONOCHROME1", saturated = "SATURATED", metal = "METAL", values_rounded = "VALUES_ROUNDED",
