@@ -108,6 +108,40 @@ void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t
   if (out_done < size) fail(path, "the compressed voxels end early or are damaged", "copy the file again from its source");
 }
 
+// What "data file" names (teem.sourceforge.net/nrrd/format.html#detached): one file, "LIST [subdim]" with a name a line, or
+// "NAME%03d.EXT first last step [subdim]". Each holds as much as the others, one after the other along the slowest axis.
+std::vector<fs::path> data_files(const std::string& value, const std::vector<std::string>& list, const fs::path& path) {
+  std::vector<fs::path> files;
+  const auto add = [&](const std::string& name) { files.push_back(path.parent_path() / name); };
+  std::istringstream words(value);
+  std::string name;
+  words >> name;
+  const std::size_t sign = name.find('%');
+  if (name == "LIST") {
+    for (const std::string& line : list) add(line);
+  } else if (sign != std::string::npos) {
+    std::size_t end = sign + 1;
+    while (end < name.size() && name[end] >= '0' && name[end] <= '9') ++end;
+    const std::string width = name.substr(sign + 1, end - sign - 1);
+    long first = 0, last = 0, step = 0;
+    if (end >= name.size() || name[end] != 'd' || width.size() > 2 || name.find('%', end) != std::string::npos ||
+        !(words >> first >> last >> step) || step == 0 || (last - first) / step < 0 || (last - first) / step > 65536) {
+      fail(path, "the data files '" + value + "' are not like slice%03d.raw 1 100 1");
+    }
+    for (long n = first; step > 0 ? n <= last : n >= last; n += step) {
+      std::string number = std::to_string(std::abs(n));
+      const std::size_t wanted = width.empty() ? 0 : static_cast<std::size_t>(std::stoi(width));
+      const std::size_t missing = wanted > number.size() + (n < 0 ? 1 : 0) ? wanted - number.size() - (n < 0 ? 1 : 0) : 0;
+      number.insert(0, missing, width.starts_with('0') ? '0' : ' ');
+      add(name.substr(0, sign) + (n < 0 ? "-" : "") + number + name.substr(end + 1));
+    }
+  } else {
+    add(value);
+  }
+  if (files.empty()) fail(path, "its list of data files is empty");
+  return files;
+}
+
 }  // namespace
 
 RawVolume read_nrrd(const fs::path& path) {
@@ -116,6 +150,8 @@ RawVolume read_nrrd(const fs::path& path) {
   if (!all.starts_with("NRRD")) fail(path, "this is not an NRRD file");
   std::map<std::string, std::string, std::less<>> fields;
   std::map<std::string, std::string> notes;
+  std::vector<std::string> list;  // of data files
+  bool listing = false;
   std::size_t at = all.find('\n');
   bool detached = true;
   while (at != std::string_view::npos && ++at < all.size()) {
@@ -128,6 +164,10 @@ RawVolume read_nrrd(const fs::path& path) {
       break;
     }
     if (line.starts_with('#')) continue;
+    if (listing) {
+      list.emplace_back(line);
+      continue;
+    }
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos) fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
     if (line.substr(colon).starts_with(":=")) {
@@ -136,7 +176,9 @@ RawVolume read_nrrd(const fs::path& path) {
     }
     std::string_view value = line.substr(colon + 1);
     while (value.starts_with(' ') || value.starts_with('\t')) value.remove_prefix(1);
-    fields[lower_case(std::string(line.substr(0, colon)))] = std::string(value);
+    const std::string key = lower_case(std::string(line.substr(0, colon)));
+    listing = (key == "data file" || key == "datafile") && (value == "LIST" || value.starts_with("LIST "));
+    fields[key] = std::string(value);
   }
   const auto get = [&](std::string_view key) {
     const auto it = fields.find(key);
@@ -193,30 +235,35 @@ RawVolume read_nrrd(const fs::path& path) {
   }
 
   const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
-  std::vector<std::byte> apart;
-  std::span<const std::byte> body;
+  const auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
+  const std::string encoding = lower_case(get("encoding"));
+  for (const char* const skip : {"byte skip", "byteskip", "line skip", "lineskip"}) {
+    if (!get(skip).empty() && get(skip) != "0") fail(path, std::string("'") + skip + "' is not supported", "save it with its own header");
+  }
+  const auto take = [&](std::span<const std::byte> body, const fs::path& from, std::size_t offset, std::size_t wanted) {
+    if (encoding == "raw") {
+      if (body.size() < wanted) {
+        fail(from, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(wanted),
+             "the file was cut short; copy it again from its source");
+      }
+      std::memcpy(voxels.get() + offset, body.data(), wanted);
+    } else if (encoding == "gzip" || encoding == "gz") {
+      inflate_into(body, voxels.get() + offset, wanted, from);
+    } else {
+      fail(path, "the encoding '" + encoding + "' is not supported", "save it with gzip or raw encoding");
+    }
+  };
   std::string data_file = get("data file");
   if (data_file.empty()) data_file = get("datafile");
   if (!data_file.empty()) {
-    if (data_file.find('%') != std::string::npos || data_file == "LIST") fail(path, "several data files are not supported");
-    apart = read_file(path.parent_path() / data_file);
-    body = apart;
+    const auto files = data_files(data_file, list, path);
+    if (size % files.size() != 0)
+      fail(path, std::to_string(size) + " bytes of voxels cannot lie in " + std::to_string(files.size()) + " files of the same size");
+    const std::size_t each = size / files.size();
+    for (std::size_t i = 0; i < files.size(); ++i) take(read_file(files[i]), files[i], i * each, each);
   } else {
     if (detached) fail(path, "the header does not end and names no data file");
-    body = std::span(bytes).subspan(at + 1);
-  }
-  const auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
-  const std::string encoding = lower_case(get("encoding"));
-  if (encoding == "raw") {
-    if (body.size() < size) {
-      fail(path, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(size),
-           "the file was cut short; copy it again from its source");
-    }
-    std::memcpy(voxels.get(), body.data(), size);
-  } else if (encoding == "gzip" || encoding == "gz") {
-    inflate_into(body, voxels.get(), size, path);
-  } else {
-    fail(path, "the encoding '" + encoding + "' is not supported", "save it with gzip or raw encoding");
+    take(std::span(bytes).subspan(at + 1), path, 0, size);
   }
   const bool big = lower_case(get("endian")) == "big";
   if (scalar > 1 && big != (std::endian::native == std::endian::big)) {
