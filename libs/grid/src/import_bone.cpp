@@ -208,7 +208,7 @@ ImportedBone import_bone(const fs::path& source, const ImportBoneParams& p, cons
 StageInfo ImportBoneStage::info() {
   return {
       .name = "import-bone",
-      .version = 1,
+      .version = 2,
       .synopsis = "DICOM straight to sparse bone, without the volume in memory",
       .description =
           "Reads slices a few at a time, places each by its own position and samples isotropic voxels between them in one pass: a tilted "

@@ -10,7 +10,7 @@ namespace osteo {
 
 struct ResampleParams {
   double spacing_mm = 0.5;
-  double lower = 0;  ///< 0: the value that tells the mask from the rest best
+  double lower = 0;                          ///< 0: the value that tells the mask from the rest best
   std::array<double, 3> box_mm{0, 0, 0};     ///< only this much, around centre_mm; 0: all there is
   std::array<double, 3> centre_mm{0, 0, 0};  ///< LPS
   double align_mm = 0.5;                     ///< the box grows to faces of voxels of this edge: those of the bone it is a finer part of
@@ -30,7 +30,8 @@ struct ResampledBone {
 /// A voxel's density is the share of it inside, from the signed HU distance to the boundary over its gradient; coarser
 /// voxels than the CT's are averaged from sub-voxels, so nothing aliases.
 /// With a box, the boundary's offset is that of the whole bone at align_mm, so that both meet where they touch.
-/// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels (the highest such).
+/// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels: the highest such, or the middle
+/// where they are more than 20 HU apart (a warning says so).
 /// `ct` and `mask` must lie at the same place (Error usage). O(output voxels near bone). Same bytes for any thread count.
 [[nodiscard]] ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& params, const Context& context = {});
 
@@ -38,7 +39,8 @@ struct ResampleStage {
   using Params = ResampleParams;
   static void describe(Params& p, auto& visit) {
     visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
-    visit({"lower", "HU at the boundary of bone (0: the value that fits the mask best, the --lower of threshold)", "HU", -32768, 32767}, p.lower);
+    visit({"lower", "HU at the boundary of bone (0: the value that fits the mask best, the --lower of threshold)", "HU", -32768, 32767},
+          p.lower);
     visit({"box_mm", "only a box of this size: a region of interest in a coarser bone (0,0,0: all)", "mm", 0, 1000}, p.box_mm);
     visit({"centre_mm", "middle of the box, LPS", "mm"}, p.centre_mm);
     visit({"align_mm", "edge of the voxels of that coarser bone; the box grows to their faces", "mm", 0.05, 10}, p.align_mm);
