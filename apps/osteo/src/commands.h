@@ -37,8 +37,16 @@ struct SeriesCommand {
 };
 
 struct GuideCommand {
-  struct Params {};
-  static void describe(Params&, auto&) {}
+  struct Params {
+    std::string series;
+    double hu_offset = 0;
+    std::string picture;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"series", "DICOM series to take, by number, UID, or scan like A1a or A1a:203 (empty: the recommended one)"}, p.series);
+    visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
+    visit({"picture", "write the histogram with what was found in it, as .svg"}, p.picture);
+  }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
 };
@@ -136,6 +144,7 @@ struct PrepareCommand {
     std::string names;
     std::string series;
     std::string axes;
+    double hu_offset = 0;
     std::string pipeline;
     bool fresh = false;
   };
@@ -153,6 +162,7 @@ struct PrepareCommand {
            "one)"},
           p.series);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
+    visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
     visit({"fresh", "forget the flags that the case remembers: only those given now count"}, p.fresh);
   }
