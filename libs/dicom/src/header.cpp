@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -103,6 +104,23 @@ std::string patient_of(vtkDICOMMetaData* meta) {
   return all;
 }
 
+// A word of its own that names a projection: "MIP", "MINIP", "MAX_IP", "Thin MIP 10mm"; no "MIPS".
+bool is_projection(const std::string& text) {
+  std::string word;
+  for (const char c : lower_case(text) + ' ') {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
+    }
+    if (c == '_' && (word == "max" || word == "min")) continue;
+    for (const char* const name : {"mip", "minip", "mipi", "maxip", "maxmip", "minmip"}) {
+      if (word == name) return true;
+    }
+    word.clear();
+  }
+  return false;
+}
+
 bool read_vec(const vtkDICOMValue& value, std::size_t at, Vec3& out) {
   if (value.GetNumberOfValues() < at + 3) return false;
   out = {value.GetDouble(at), value.GetDouble(at + 1), value.GetDouble(at + 2)};
@@ -129,6 +147,7 @@ DicomFrame read_frame(vtkDICOMMetaData* meta, int frame) {
   }
   if (const vtkDICOMValue& s = get(DC::RescaleSlope); s.IsValid() && s.GetNumberOfValues() > 0) f.slope = s.AsDouble();
   if (const vtkDICOMValue& s = get(DC::RescaleIntercept); s.IsValid() && s.GetNumberOfValues() > 0) f.intercept = s.AsDouble();
+  f.rescale_type = trimmed(get(DC::RescaleType).AsString());
   return f;
 }
 
@@ -219,6 +238,9 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.modality = text_of(meta, DC::Modality);
   h.image_type = trimmed(meta->Get(DC::ImageType).AsString());
   h.description = text_of(meta, DC::SeriesDescription);
+  const std::string technique = text_of(meta, DC::VolumeBasedCalculationTechnique);
+  h.projection = is_projection(h.image_type) || is_projection(h.description) || technique == "MAX_IP" || technique == "MIN_IP" ||
+                 technique == "VOLUME_RENDER" || technique == "SURFACE_RENDER";
   h.kernel = text_of(meta, DC::ConvolutionKernel);
   h.manufacturer = text_of(meta, DC::Manufacturer);
   h.series_number = meta->Get(DC::SeriesNumber).AsInt();

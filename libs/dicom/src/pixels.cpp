@@ -7,14 +7,17 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "decode.h"
 
 namespace osteo::dicom {
 namespace {
 
-// Scanners mark what they did not measure with values that no tissue has; noise of air does not reach this far.
+// Scanners mark what they did not measure with one value that no tissue has, below the noise of air. Dark streaks beside metal come down
+// here as well, but with many values.
 constexpr double kPaddingBelowHu = -1200;
+constexpr double kSamePaddingHu = 8;
 // A padding tag that names a value above this names tissue.
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
@@ -103,12 +106,37 @@ class Converter {
   // `in` and `out` may be the same memory when T has two bytes.
   template <class T>
   void run(const T* in, std::int16_t* out, std::size_t columns, std::size_t rows) {
+    find_padding(in, columns * rows);
     if (count_.histogram.empty()) count_.histogram.assign(ValueCount::kBins, 0);
     for (std::size_t y = 0; y < rows; ++y) row(in + y * columns, out + y * columns, columns, y % 4 == 0);
     count_.pixels += columns * rows;
   }
 
  private:
+  // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all others.
+  template <class T>
+  void find_padding(const T* in, std::size_t n) {
+    if (h_.lossy) {
+      // One value no longer: all that is as low.
+      found_ = static_cast<std::int64_t>(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
+      return;
+    }
+    const double reach = kSamePaddingHu / f_.slope;
+    for (int found = 0; found < 2; ++found) {
+      std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::int64_t v = in[i];
+        if (v > found_ && v < lowest && !(v >= pad_lo_ && v <= pad_hi_)) lowest = v;
+      }
+      if (hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
+      const auto top = lowest + static_cast<std::int64_t>(reach);
+      std::size_t same = 0;
+      for (std::size_t i = 0; i < n; ++i) same += in[i] >= lowest && in[i] <= top ? 1 : 0;
+      if (same < 16 || static_cast<double>(same) < 2e-4 * static_cast<double>(n)) return;
+      found_ = top;
+    }
+  }
+
   template <class T>
   void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
     std::int64_t lo = 1 << 30, hi = -(1 << 30);
@@ -121,12 +149,9 @@ class Converter {
     const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
     const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
     const bool tissue = tissue_lo_ <= tissue_hi_ && lo <= tissue_hi_ && hi >= tissue_lo_;
-    if (whole && !padded && !tissue && low >= kPaddingBelowHu && high <= 32767) {
+    if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
       const auto shift = static_cast<int>(f_.intercept);
-      for (std::size_t i = 0; i < n; ++i) {
-        const int v = static_cast<int>(in[i]) + shift;
-        out[i] = static_cast<std::int16_t>(v < kAirHu ? kAirHu : v);
-      }
+      for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::int16_t>(static_cast<int>(in[i]) + shift);
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
     } else {
       careful_row(in, out, n);
@@ -143,7 +168,7 @@ class Converter {
     for (std::size_t i = 0; i < n; ++i) {
       const int bin = (out[i] + 1200) >> 2;
       // Air that the scanner cut off at -1024 is no peak of its own.
-      if (bin >= 0 && bin < ValueCount::kBins && out[i] > kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
+      if (bin >= 0 && bin < ValueCount::kBins && out[i] != kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
     }
   }
 
@@ -159,15 +184,16 @@ class Converter {
         continue;
       }
       if (stored >= tissue_lo_ && stored <= tissue_hi_) ++count_.declared_tissue;
-      if (hu < kPaddingBelowHu) {
+      if (stored <= found_) {
         ++count_.found;
         count_.padding_hu = std::min(count_.padding_hu, hu);
         out[i] = kNoValue;
         continue;
       }
       if (hu > 32767) ++count_.out_of_range;
+      if (hu < kPaddingBelowHu) ++count_.below_air;
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(std::floor(hu + 0.5)));
-      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(hu + 0.5), static_cast<double>(kAirHu), 32767.0));
+      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(hu + 0.5), -32767.0, 32767.0));
     }
   }
 
@@ -175,6 +201,7 @@ class Converter {
   const DicomFrame& f_;
   ValueCount& count_;
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
+  std::int64_t found_ = std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names
 };
 
 }  // namespace
@@ -204,6 +231,7 @@ void ValueCount::add(const ValueCount& o) {
   out_of_range += o.out_of_range;
   saturated += o.saturated;
   metal += o.metal;
+  below_air += o.below_air;
   high_bit_wrong += o.high_bit_wrong;
   sign_not_extended += o.sign_not_extended;
   bits_foreign += o.bits_foreign;

@@ -18,6 +18,7 @@
 #include "osteo/base/parallel.h"
 #include "osteo/base/param.h"
 #include "osteo/io/vtk_data.h"
+#include "pixels.h"
 #include "unpack.h"
 
 namespace osteo {
@@ -128,7 +129,10 @@ bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
 double cost(const DicomSeries& s, const Placement& p, std::string& why) {
   const bool bone = bone_kernel(s, s.headers.front().manufacturer);
   const bool axial = std::abs(p.normal.z) > 0.7;
-  const bool whole = !p.verdict.has(code::slices_missing) && p.verdict.set_aside.empty();
+  const bool whole = !p.verdict.has(code::slices_missing) &&
+                     std::all_of(p.verdict.set_aside.begin(), p.verdict.set_aside.end(), [](const FileSetAside& f) {
+                       return f.code == code::duplicate_file || f.code == code::duplicate_slice || f.code == code::localizer;
+                     });
   const bool original = s.headers.front().image_type.starts_with("ORIGINAL") || s.headers.front().image_type.empty();
   const double extent = p.slices.back().along_mm;
   why = "slices " + format_number(std::round(p.verdict.gap_usual_mm * 100) / 100) + " mm apart";
@@ -149,7 +153,8 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
     s.problem = "it is a localizer";
     return;
   }
-  const Placement p = place_slices(s.headers, options);
+  const Placement p = place_slices(s.headers, options, {},
+                                   [&](std::size_t a, std::size_t b) { return dicom::same_stored_pixels(s.headers[a], s.headers[b]); });
   s.gap_mm = p.verdict.gap_usual_mm;
   for (const Finding& f : p.verdict.findings) {
     if (f.severity != Severity::error) continue;
@@ -163,6 +168,7 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
   if (p.verdict.tilt_deg > 0.05) s.what += ", tilted";
   if (p.verdict.has(code::gaps_uneven)) s.what += ", uneven";
   if (p.verdict.has(code::slices_missing)) s.what += ", holes";
+  if (p.verdict.has(code::slices_overlap)) s.what += ", overlapping";
   if (p.verdict.stacks > 1) s.what += ", " + std::to_string(p.verdict.stacks) + " stacks";
   price = cost(s, p, s.why);
 }
@@ -303,6 +309,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     for (std::size_t i = begin; i < end; ++i) {
       headers[i] = read_dicom_header(found[i].file, scan.scratch->path());
       headers[i].name = found[i].name;
+      for (DicomFrame& f : headers[i].frames) f.intercept += options.hu_offset;
     }
     done += end - begin;
     context.progress(0.4 + 0.5 * static_cast<double>(done) / static_cast<double>(found.size()), "reading headers");

@@ -61,6 +61,7 @@ std::string to_json(const Verdict& v) {
     j["series"] = {{"number", v.series},     {"stack", v.stack},   {"stacks", v.stacks},
                    {"modality", v.modality}, {"kernel", v.kernel}, {"thickness_mm", tidy(v.thickness_mm)},
                    {"why", v.why_chosen}};
+    if (!v.scan_hash.empty()) j["series"]["scan_hash"] = v.scan_hash;
     j["geometry"] = {{"slices", v.slices.size()},
                      {"columns", v.columns},
                      {"rows", v.rows},
@@ -126,6 +127,7 @@ VerdictSummary read_verdict(std::string_view text) {
     if (j.at("osteotome_verdict").get<int>() != 1) throw no_verdict("of an unknown version");
     VerdictSummary summary;
     summary.status = j.at("status").get<std::string>();
+    if (j.contains("series")) summary.scan_hash = j.at("series").value("scan_hash", "");
     for (const auto& f : j.at("findings")) {
       Finding finding;
       finding.code = f.at("code").get<std::string>();

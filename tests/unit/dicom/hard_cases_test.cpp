@@ -8,6 +8,7 @@
 #include "osteo/dicom/import.h"
 #include "osteo/dicom/objects.h"
 #include "osteo/dicom/volume.h"
+#include "osteo/io/volume_io.h"
 #include "reference.h"
 
 namespace osteo {
@@ -759,6 +760,197 @@ TEST(HardCase, C27_OneScanThatLooksLikeSeveral) {
   const Imported r = load(careless.folder);
   EXPECT_TRUE(r.verdict.has(code::frame_of_reference_wrong));
   EXPECT_EQ(r.verdict.slices.size(), 20u);
+}
+
+// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Refused, with the offset that mends it.
+TEST(HardCase, C28_WithoutTheOffset) {
+  for (const bool thorough : {true, false}) {
+    PhantomParams p;
+    p.spacing_mm = 3;
+    const fs::path folder = test::scratch("c28") / "series";
+    save_dicom_series(make_phantom(p).ct, folder);
+    const Imported wanted = load(folder);
+    Series s("c28-shifted", test::files_in(folder));
+    s.edit_all([&](DcmDataset& d, int) {
+      const Uint16* read = nullptr;
+      unsigned long count = 0;
+      ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+      std::vector<Uint16> pixels(read, read + count);
+      for (auto& v : pixels) v = static_cast<Uint16>(static_cast<std::int16_t>(v) + 1024);
+      ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+      d.putAndInsertUint16(DCM_PixelRepresentation, 0);
+      d.findAndDeleteElement(DCM_PixelPaddingValue);
+      // The one leaves the tag out, the other says 0.
+      thorough ? put(d, DCM_RescaleIntercept, "0") : static_cast<void>(d.findAndDeleteElement(DCM_RescaleIntercept));
+    });
+    const Verdict v = refusal(s.folder, code::hu_shifted, "-1024 HU added to each would put them right");
+    EXPECT_TRUE(v.has(code::bone_implausible));
+    ImportParams params;
+    params.hu_offset = -1024;
+    const Imported mended = load(s.folder, params);
+    EXPECT_TRUE(mended.verdict.has(code::hu_offset));
+    EXPECT_TRUE(mended.verdict.values.plausible);
+    EXPECT_FALSE(mended.verdict.has(code::bone_implausible));
+    expect_same_voxels(wanted.image, mended.image);
+    // As a volume file alike.
+    ImportParams any;
+    any.any_modality = true;
+    const fs::path file = test::scratch("c28-file") / "ct.nrrd";
+    save_image(load(s.folder, any).image, file);
+    refusal(file, code::hu_shifted, "-1024 HU");
+    expect_same_voxels(wanted.image, load(file, params).image);
+  }
+}
+
+TEST(HardCase, C29_ProjectionsAndSlabs) {
+  const auto made = [](const char* name, const std::function<void(DcmDataset&)>& change) {
+    auto s = std::make_unique<Series>(name, slices(0, 20));
+    s->edit_all([&](DcmDataset& d, int) { change(d); });
+    return s;
+  };
+  const auto by_type = made("c29-type", [](DcmDataset& d) {
+    put(d, DCM_ImageType, "DERIVED\\SECONDARY\\MIP");
+    put(d, DCM_SliceThickness, "10");
+  });
+  refusal(by_type->folder, code::projection, "slab of 10 mm");
+  ImportParams any;
+  any.any_modality = true;
+  EXPECT_TRUE(load(by_type->folder, any).verdict.has(code::projection));
+  refusal(made("c29-name", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "AX Thin MIP_10mm"); })->folder, code::projection);
+  EXPECT_FALSE(load(made("c29-other", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "Mipham temporal"); })->folder)
+                   .verdict.has(code::projection));
+  const auto by_far = made("c29-slab", [](DcmDataset& d) { put(d, DCM_SliceThickness, "10"); });
+  const Verdict slab = load(by_far->folder).verdict;
+  EXPECT_TRUE(slab.has(code::slices_overlap));
+  EXPECT_EQ(slab.status(), "repaired");
+  const auto half = made("c29-half", [](DcmDataset& d) { put(d, DCM_SliceThickness, "2"); });
+  const Verdict overlap = load(half->folder).verdict;
+  EXPECT_TRUE(overlap.has(code::slices_overlap));
+  EXPECT_EQ(overlap.status(), "good");
+}
+
+TEST(HardCase, C30_ValuesThatAreNoHounsfieldUnits) {
+  for (const char* type : {"Z_EFF", "ED", "MGML", "PCT"}) {
+    Series s("c30", slices(0, 12));
+    s.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, type); });
+    refusal(s.folder, code::rescale_type, type);
+  }
+  Series modified("c30-modified", slices(0, 12)), unspecified("c30-us", slices(0, 12));
+  modified.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, "HU_MOD"); });
+  EXPECT_TRUE(load(modified.folder).verdict.has(code::rescale_type));
+  unspecified.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, "US"); });
+  EXPECT_FALSE(load(unspecified.folder).verdict.has(code::rescale_type));
+}
+
+// Dark streaks beside metal are measured; a value that marks what was not measured is not.
+TEST(HardCase, C31_BelowAirIsKept) {
+  Series s("c31", slices(0, 12));
+  store_as(
+      s,
+      [](int hu, std::size_t i) {
+        if (i < 2000) return static_cast<Uint16>(-2000);
+        return static_cast<Uint16>(i > 20000 && i < 20100 ? -1100 - static_cast<int>(i % 97) * 7 : hu);
+      },
+      16, 15, true, 0);
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.image.voxels[0], -1024);
+  EXPECT_TRUE(r.verdict.has(code::padding_found));
+  EXPECT_TRUE(r.verdict.has(code::below_air));
+  for (int i = 20001; i < 20100; ++i) EXPECT_EQ(r.image.voxels[static_cast<std::size_t>(i)], -1100 - i % 97 * 7);
+}
+
+// Words that are true.
+TEST(HardCase, C32_OneShiftedSliceIsNoTilt) {
+  Series s("c32", slices(0, 20));
+  const auto shift = [](DcmDataset& d, double by) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, p.y + by, p.z}));
+  };
+  s.edit("019", [&](DcmDataset& d) { shift(d, 9); });
+  const Verdict v = load(s.folder).verdict;
+  EXPECT_FALSE(v.has(code::tilted));
+  EXPECT_EQ(v.tilt_deg, 0);
+  const auto it = std::find_if(v.findings.begin(), v.findings.end(), [](const auto& f) { return f.code == code::shifted_sideways; });
+  ASSERT_NE(it, v.findings.end());
+  EXPECT_NE(it->message.find("one slice ('019') is shifted sideways by 9 mm"), std::string::npos) << it->message;
+  // The table moved half-way: a step, and no tilt either.
+  Series half("c32-half", slices(0, 20));
+  half.edit_all([&](DcmDataset& d, int i) { shift(d, i < 10 ? 0 : 6); });
+  const Verdict step = load(half.folder).verdict;
+  EXPECT_FALSE(step.has(code::tilted));
+  EXPECT_TRUE(step.has(code::shifted_sideways));
+  // Positions rounded to tenths of a millimetre on a tilted series are still a tilt, and no shift.
+  Series rounded("c32-rounded", slices(0, 20));
+  rounded.edit_all([&](DcmDataset& d, int) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, std::round((p.y + 0.13 * p.z) * 10) / 10, p.z}));
+  });
+  const Verdict tilted = load(rounded.folder).verdict;
+  EXPECT_TRUE(tilted.has(code::tilted));
+  EXPECT_FALSE(tilted.has(code::shifted_sideways));
+  EXPECT_NEAR(tilted.tilt_deg, 7.4, 0.3);
+}
+
+TEST(HardCase, C32_DuplicatesLeaveTheSeriesComplete) {
+  Series s("c32-twice", slices(0, 20));
+  fs::copy_file(fs::canonical(s.folder / "010"), s.folder / "copy of 010");
+  s.edit(
+      "011", [](DcmDataset& d) { put(d, DCM_SOPInstanceUID, "1.2.3.4.5"); }, "011 again");
+  const DicomScan scan = scan_dicom(s.folder);
+  ASSERT_EQ(scan.series.size(), 1u);
+  EXPECT_TRUE(scan.series[0].usable);
+  EXPECT_NE(scan.series[0].why.find(", complete"), std::string::npos) << scan.series[0].why;
+}
+
+TEST(HardCase, C32_ACroppedThoraxIsOnTheScale) {
+  // Lungs of -850 HU with airways, muscle and bone: no air around the body, as in a scan cut to the heart.
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 15);
+  Frame f;
+  f.dims = {96, 96, 40};
+  f.spacing_mm = {2, 2, 2};
+  const auto voxels = make_voxels<std::int16_t>(f.voxel_count());
+  const auto make = [&](double scale) {
+    for (std::size_t i = 0; i < f.voxel_count(); ++i) {
+      const std::size_t x = i % 96;
+      const double hu = x < 40 ? (i % 50 == 0 ? -990 : -850) : x < 85 ? 50 : x < 88 ? 700 : -100;
+      voxels[i] = static_cast<std::int16_t>(std::lround(scale * hu + noise(random)));
+    }
+    const fs::path file = test::scratch("c32-thorax") / "ct.nrrd";
+    save_image({f, voxels}, file);
+    return load(file).verdict;
+  };
+  const Verdict v = make(1);
+  EXPECT_FALSE(v.has(code::hu_scaled));
+  EXPECT_TRUE(v.values.plausible);
+  EXPECT_EQ(v.status(), "good");
+  // The same on another scale is found out.
+  EXPECT_FALSE(make(0.85).values.plausible);
+}
+
+TEST(HardCase, C32_PicturesOfOneFileAreToldApart) {
+  const auto& all = straight_series();
+  Series s("c32-frames", {all[0]});
+  s.edit("000", [&](DcmDataset& d) {
+    const Uint16* read = nullptr;
+    unsigned long n = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &n).good());
+    std::vector<Uint16> pixels;
+    OFString spacing, orientation;
+    d.findAndGetOFStringArray(DCM_PixelSpacing, spacing);
+    for (int i = 0; i < 11; ++i) {
+      pixels.insert(pixels.end(), read, read + n);
+      DcmItem *frame = nullptr, *group = nullptr;
+      ASSERT_TRUE(d.findOrCreateSequenceItem(DCM_PerFrameFunctionalGroupsSequence, frame, i).good());
+      ASSERT_TRUE(frame->findOrCreateSequenceItem(DCM_PlanePositionSequence, group, 0).good());
+      put(*group, DCM_ImagePositionPatient, test::text({0, 0, i < 6 ? double(i) : i + 6.0}));
+    }
+    d.findAndDeleteElement(DCM_ImagePositionPatient);
+    put(d, DCM_NumberOfFrames, "11");
+    put(d, DCM_SOPClassUID, UID_EnhancedCTImageStorage);
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+  });
+  refusal(s.folder, code::hole_too_wide, "between '000 (picture 6)' and '000 (picture 7)'");
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ struct DicomFrame {
   Vec3 along_row, along_column;
   double column_spacing_mm = 0, row_spacing_mm = 0;  ///< between columns (along a row), between rows; 0 when not stated
   double slope = 1, intercept = 0;
+  std::string rescale_type;  ///< what the values are: "HU", or empty where the file does not say
 };
 
 struct DicomHeader {
@@ -41,6 +42,7 @@ struct DicomHeader {
 
   int columns = 0, rows = 0, samples = 1;
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
+  bool projection = false;                   ///< its pictures show the most (or least) of a slab, or a rendering, not a slice
   bool is_signed = false, inverted = false;  ///< inverted: MONOCHROME1
   bool overlay_in_pixels = false;            ///< bits around those of the pixel hold an overlay
   std::optional<int> padding, padding_limit;

@@ -14,11 +14,13 @@ struct ImportParams {
   double max_gap_mm = 8;
   double max_hole_mm = 3;
   bool any_modality = false;
+  double hu_offset = 0;
   std::string axes;
 };
 
 [[nodiscard]] inline PlaceOptions place_options(const ImportParams& p) {
-  return {.max_gap_mm = p.max_gap_mm, .max_hole_mm = p.max_hole_mm, .stack = p.stack, .any_modality = p.any_modality};
+  return {
+      .max_gap_mm = p.max_gap_mm, .max_hole_mm = p.max_hole_mm, .stack = p.stack, .any_modality = p.any_modality, .hu_offset = p.hu_offset};
 }
 
 struct Imported {
@@ -26,7 +28,7 @@ struct Imported {
   Verdict verdict;
 };
 
-/// A DICOM folder, DICOMDIR, file or archive, or a volume file. Values below -1024 HU become -1024.
+/// A DICOM folder, DICOMDIR, file or archive, or a volume file.
 /// Throws Refused (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom, choose_series and
 /// load_image.
 [[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params, const Context& context = {});
@@ -42,7 +44,8 @@ struct ImportStage {
     visit({"stack", "which stack of a series that holds several (0: the best)", "", 0, 1000}, p.stack);
     visit({"max_gap_mm", "widest usual distance between slices that is interpolated", "mm", 0, 50}, p.max_gap_mm);
     visit({"max_hole_mm", "widest distance that is interpolated where slices are missing", "mm", 0, 50}, p.max_hole_mm);
-    visit({"any_modality", "take a series that is no CT; its values are not HU"}, p.any_modality);
+    visit({"any_modality", "take a series that is no CT, no slices or not in HU"}, p.any_modality);
+    visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPS or LPI (empty: as the file says)"},
           p.axes);
   }

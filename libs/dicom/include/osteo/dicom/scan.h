@@ -44,6 +44,7 @@ struct DicomScan {
 /// `source`: a folder (any depth), a DICOMDIR, a DICOM file (one slice stands for its series: the
 /// files beside it that belong to it), or an archive
 /// (zip, tar, 7z; unpacked into the system's temporary folder). Headers are read in parallel, each once, no pixels.
+/// `options.hu_offset` is added to each intercept.
 /// A series whose files are of several patients, studies or frames of reference becomes several.
 /// Names shown hold no value that identifies the patient: such a folder becomes "*",
 /// such a file "file-000012".
