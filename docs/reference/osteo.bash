@@ -35,7 +35,7 @@ _osteo() {
   local flags="--threads --force --quiet --json --progress --seed --help"
   case "${COMP_WORDS[1]}" in
     import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --axes --verdict-out" ;;
-    import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-out --valid-out --verdict-out" ;;
+    import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;

@@ -116,12 +116,15 @@ class Converter {
   // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all others.
   template <class T>
   void find_padding(const T* in, std::size_t n) {
+    T least = n > 0 ? in[0] : T{};
+    for (std::size_t i = 0; i < n; ++i) least = std::min(least, in[i]);
+    if (hounsfield(static_cast<double>(least), f_) >= kPaddingBelowHu) return;
+    const auto whole = [](double stored) { return static_cast<std::int64_t>(std::clamp(stored, -1e12, 1e12)); };
     if (h_.lossy) {
       // One value no longer: all that is as low.
-      found_ = static_cast<std::int64_t>(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
+      found_ = whole(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
       return;
     }
-    const double reach = kSamePaddingHu / f_.slope;
     for (int found = 0; found < 2; ++found) {
       std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
       for (std::size_t i = 0; i < n; ++i) {
@@ -129,7 +132,7 @@ class Converter {
         if (v > found_ && v < lowest && !(v >= pad_lo_ && v <= pad_hi_)) lowest = v;
       }
       if (hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
-      const auto top = lowest + static_cast<std::int64_t>(reach);
+      const auto top = lowest + whole(kSamePaddingHu / f_.slope);
       std::size_t same = 0;
       for (std::size_t i = 0; i < n; ++i) same += in[i] >= lowest && in[i] <= top ? 1 : 0;
       if (same < 16 || static_cast<double>(same) < 2e-4 * static_cast<double>(n)) return;

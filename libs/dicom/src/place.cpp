@@ -471,6 +471,8 @@ class Placer {
   }
 
   static double median(std::vector<double> values) {
+    std::erase_if(values, [](double v) { return !std::isfinite(v); });
+    if (values.empty()) return 0;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
@@ -502,6 +504,7 @@ class Placer {
       mean += s[i].along_mm;
       mean_side += s[i].sideways_mm[a];
     }
+    if (n == 0) return {0, level};
     mean /= n;
     mean_side /= n;
     for (std::size_t i = 0; i < s.size(); ++i) {

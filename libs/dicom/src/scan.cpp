@@ -153,8 +153,12 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
     s.problem = "it is a localizer";
     return;
   }
-  const Placement p = place_slices(s.headers, options, {},
-                                   [&](std::size_t a, std::size_t b) { return dicom::same_stored_pixels(s.headers[a], s.headers[b]); });
+  // A series over time has very many pictures at one place: there a look at some is enough for a list.
+  int asked = 0;
+  const Placement p = place_slices(s.headers, options, {}, [&](std::size_t a, std::size_t b) {
+    if (++asked <= 40) return dicom::same_stored_pixels(s.headers[a], s.headers[b]);
+    return !s.headers[a].sop_uid.empty() && s.headers[a].sop_uid == s.headers[b].sop_uid;
+  });
   s.gap_mm = p.verdict.gap_usual_mm;
   for (const Finding& f : p.verdict.findings) {
     if (f.severity != Severity::error) continue;
