@@ -35,8 +35,8 @@ _osteo() {
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
   case "${COMP_WORDS[1]}" in
-    import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --axes --verdict-out" ;;
-    import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-out --valid-out --verdict-out" ;;
+    import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --axes --verdict-out" ;;
+    import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;
@@ -60,11 +60,11 @@ _osteo() {
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
-    series) flags="$flags" ;;
-    guide) flags="$flags" ;;
+    series) flags="$flags --studies" ;;
+    guide) flags="$flags --series --hu-offset --picture" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
-    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --pipeline --fresh" ;;
+    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --hu-offset --pipeline --fresh" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;

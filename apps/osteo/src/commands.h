@@ -26,15 +26,27 @@ struct InfoCommand {
 };
 
 struct SeriesCommand {
-  struct Params {};
-  static void describe(Params&, auto&) {}
+  struct Params {
+    bool studies = false;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"studies", "also the date and description of each study, which can tell who the patient is"}, p.studies);
+  }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
 struct GuideCommand {
-  struct Params {};
-  static void describe(Params&, auto&) {}
+  struct Params {
+    std::string series;
+    double hu_offset = 0;
+    std::string picture;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"series", "DICOM series to take, by number, UID, or scan like A1a or A1a:203 (empty: the recommended one)"}, p.series);
+    visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
+    visit({"picture", "write the histogram with what was found in it, as .svg"}, p.picture);
+  }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
 };
@@ -48,7 +60,7 @@ struct ConvertCommand {
   };
   static void describe(Params& p, auto& visit) {
     visit({"source", "DICOM it was made from: a .dcm output takes over its patient, study and frame of reference"}, p.source);
-    visit({"series", "which series of the source, by number or UID (empty: the recommended one)"}, p.series);
+    visit({"series", "which series of the source, by number, UID, or scan like A1a or A1a:203 (empty: the recommended one)"}, p.series);
     visit({"onto_source", "a label map as .dcm: on the source's own slices, tilted and uneven as they are"}, p.onto_source);
     visit({"description", "of a .dcm output, as a PACS lists it"}, p.description);
   }
@@ -132,6 +144,7 @@ struct PrepareCommand {
     std::string names;
     std::string series;
     std::string axes;
+    double hu_offset = 0;
     std::string pipeline;
     bool fresh = false;
   };
@@ -144,8 +157,12 @@ struct PrepareCommand {
     visit({"remove_table", "clear table and head holder"}, p.remove_table);
     visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"}, p.structures);
     visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'; values without a name are left out"}, p.names);
-    visit({"series", "DICOM series to take, by number or UID (empty: the recommended one)"}, p.series);
+    visit({"series",
+           "DICOM series to take, by number, UID, or scan as 'osteo import --list' shows it, like A1a or A1a:203 (empty: the recommended "
+           "one)"},
+          p.series);
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
+    visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
     visit({"fresh", "forget the flags that the case remembers: only those given now count"}, p.fresh);
   }

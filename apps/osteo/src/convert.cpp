@@ -45,9 +45,9 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
     const DicomScan scan = scan_dicom(p.source, {}, io.context);
     const DicomObjectOptions options{&choose_series(scan, p.series, p.source), p.description};
     if (const auto* labels = std::get_if<Labels>(&data)) {
-      p.onto_source ? save_segmentation_on_source(*labels, to, options) : save_segmentation(*labels, to, options);
+      p.onto_source ? save_segmentation_on_source(*labels, to, options, io.context) : save_segmentation(*labels, to, options, io.context);
     } else if (const auto* surface = std::get_if<Surface>(&data)) {
-      save_encapsulated_stl(**surface, to, options);
+      save_encapsulated_stl(**surface, to, options, io.context);
     } else {
       throw Error(ExitCode::usage, "a " + std::string(kind_name(kind_of(data))) + " cannot be written as one DICOM file");
     }

@@ -1,6 +1,7 @@
 // list, info, series: what there is.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <ostream>
 
 #include "commands.h"
@@ -156,12 +157,13 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
 cli::CommandInfo SeriesCommand::info() {
   return {"series",
           "the DICOM series of a folder and what each is",
-          "Also as 'osteo import --list'. The one marked * is taken when none is asked for.",
+          "Also as 'osteo import --list'. The one marked * is taken when none is asked for. The scan says what belongs together: a letter "
+          "for the patient, a number for the study, a letter for the frame of reference. Of several scans one must be asked for.",
           {{"folder", "folder with DICOM files at any depth"}},
           "osteo series DICOM_FOLDER"};
 }
 
-int SeriesCommand::run(const Params&, cli::Invocation& io) {
+int SeriesCommand::run(const Params& p, cli::Invocation& io) {
   if (io.arguments.size() != 1) throw Error(ExitCode::usage, "which folder? osteo import --list FOLDER");
   const DicomScan scan = scan_dicom(io.arguments[0], {}, io.context);
   io.end_progress();
@@ -170,7 +172,8 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
     j["files"] = scan.files;
     j["series"] = Json::list();
     for (const DicomSeries& s : scan.series) {
-      Json e{{"number", s.number},
+      Json e{{"scan", s.scan},
+             {"number", s.number},
              {"uid", s.uid},
              {"modality", s.modality},
              {"what", s.what},
@@ -184,6 +187,10 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
              {"gap_mm", s.gap_mm},
              {"kernel", s.kernel},
              {"description", s.description}};
+      if (p.studies) {
+        e["study_date"] = s.study_date;
+        e["study_description"] = s.study_description;
+      }
       if (s.usable) e["why"] = s.why;
       if (!s.problem.empty()) e["problem"] = s.problem;
       j["series"].push_back(std::move(e));
@@ -193,17 +200,23 @@ int SeriesCommand::run(const Params&, cli::Invocation& io) {
     io.out << j.dump(2) << '\n';
     return 0;
   }
-  io.out << "  series  images  size       pixel mm  gap mm    what                          kernel    description\n";
+  io.out << "  scan  series  images  size       pixel mm  gap mm    what                          kernel    description\n";
   for (const DicomSeries& s : scan.series) {
     char line[320];
     const std::string size = std::to_string(s.columns) + "x" + std::to_string(s.rows);
-    std::snprintf(line, sizeof line, "%c %-7d %-7d %-10s %-9.4g %-9.4g %-29s %-9s %s\n", s.recommended ? '*' : ' ', s.number, s.images,
-                  size.c_str(), s.pixel_mm, s.gap_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
+    std::snprintf(line, sizeof line, "%c %-5s %-7d %-7d %-10s %-9.4g %-9.4g %-29s %-9s %s\n", s.recommended ? '*' : ' ', s.scan.c_str(),
+                  s.number, s.images, size.c_str(), s.pixel_mm, s.gap_mm, s.what.c_str(), s.kernel.c_str(), s.description.c_str());
     io.out << line;
   }
   for (const DicomSeries& s : scan.series) {
-    if (s.recommended) io.out << "* recommended: " << s.why << '\n';
-    if (!s.problem.empty()) io.out << "  " << s.number << ": " << s.problem << '\n';
+    if (s.recommended) io.out << "* " << s.scan << ':' << s.number << " recommended: " << s.why << '\n';
+    if (!s.problem.empty()) io.out << "  " << s.scan << ':' << s.number << ": " << s.problem << '\n';
+  }
+  if (p.studies) {
+    std::map<std::string, std::string> studies;
+    for (const DicomSeries& s : scan.series)
+      studies[s.scan.substr(0, s.scan.find_last_of("0123456789") + 1)] = s.study_date + "  " + s.study_description;
+    for (const auto& [study, what] : studies) io.out << "study " << study << ": " << what << '\n';
   }
   if (!scan.set_aside.empty()) io.out << "set aside, " << scan.set_aside.size() << " of " << scan.files << " files:\n";
   constexpr std::size_t kShown = 10;

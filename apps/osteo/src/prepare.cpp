@@ -7,6 +7,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/cli/report.h"
+#include "osteo/dicom/verdict.h"
 #include "osteo/scene/case.h"
 #include "temporal_bone_pipeline.h"
 
@@ -22,6 +23,47 @@ struct Input {
 Input input_of(const std::string& named) {
   require_readable(named);
   return {named, hash_path(named)};
+}
+
+// A threshold that was asked for is where the boundary of bone lies; resample need not guess it from the mask.
+void pass_threshold_on(Pipeline& pipeline) {
+  for (PipelineNode& bone : pipeline.nodes) {
+    const auto mask = bone.inputs.find("mask");
+    if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
+    for (const PipelineNode& n : pipeline.nodes) {
+      if (n.id != mask->second.node || n.stage != "threshold" || !n.params.contains("lower")) continue;
+      const auto preset = n.params.find("preset");
+      if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
+    }
+  }
+}
+
+// The scan of the case as it is now and as it is going to be, where its verdicts know both.
+bool another_scan(const CaseUpdate& update) {
+  const fs::path before = update.folder() / "import.json", after = update.place(before);
+  if (!output_exists(before) || !output_exists(after)) return false;
+  try {
+    const std::string was = read_verdict(read_text(before)).scan_hash, is = read_verdict(read_text(after)).scan_hash;
+    return !was.empty() && !is.empty() && was != is;
+  } catch (const Error&) {
+    return false;  // a damaged verdict knows no scan
+  }
+}
+
+// Files of the old case that a person has changed are kept at the next state, but not as if they belonged to another scan.
+void set_aside_stale_files(const fs::path& folder, const std::map<std::string, ManifestFile>& before, const Context& context) {
+  const auto now = parse_manifest(read_text(folder / "manifest.json"));
+  for (const auto& [role, old] : before) {
+    const bool kept = std::any_of(now.begin(), now.end(), [&](const auto& f) { return f.second.name == old.name; });
+    const fs::path stale = folder / old.name, aside = folder / (old.name + ".of-another-scan");
+    std::error_code ec;
+    if (kept || !fs::is_regular_file(stale, ec)) continue;
+    fs::rename(stale, aside, ec);
+    if (ec)
+      throw Error(ExitCode::cannot_write, "cannot rename '" + stale.string() + "': " + ec.message(), "move it away: it is of another scan");
+    fs::remove(provenance_path(stale), ec);
+    context.warn("'" + old.name + "' was changed by hand and is of the scan before: it is now '" + aside.filename().string() + "'");
+  }
 }
 
 std::string quoted(const std::string& text) {
@@ -107,6 +149,14 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version and remembers no flags",
                 "give all its flags again, with --fresh");
   }
+  std::map<std::string, ManifestFile> files_before;  // of a case of another scan
+  const auto files_of_case = [&]() -> std::map<std::string, ManifestFile> {
+    try {
+      return parse_manifest(read_text(folder / "manifest.json"));
+    } catch (const Error&) {
+      return {};
+    }
+  };
   Input source;
   if (!io.arguments.empty()) {
     source = input_of(io.arguments[0]);
@@ -117,6 +167,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
                     "give another name, or --force to make the case anew from this scan, without the flags it remembers");
       }
       notes.push_back("another scan: forgotten is" + all_of(*before));
+      files_before = files_of_case();
       before.reset();
     }
   } else {
@@ -233,6 +284,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       if (n.id == "preview") n.inputs["mask"].node = "structures";
     }
   }
+  pass_threshold_on(pipeline);
   validate(pipeline, io.registry);
 
   // What lies in the folder that is not ours is never replaced.
@@ -272,8 +324,17 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
         std::move(pipeline), io.registry,
         {.overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }}, io.context);
     recall_facts(folder, results);
+    if (another_scan(update)) {
+      if (!io.common.force) {
+        throw Error(ExitCode::cannot_write,
+                    "'" + folder.string() + "' was made from another scan of '" + source.path.string() + "' than this series is of",
+                    "give another name, or --force to replace the case");
+      }
+      files_before = files_of_case();
+    }
     update.commit(make_manifest(update, name, results, recipe));
     remember(source.hash, fs::absolute(source.path).string());
+    set_aside_stale_files(folder, files_before, io.context);
     if (!as_the_case_holds_them && !structures.path.empty()) remember(structures.hash, fs::absolute(structures.path).string());
     for (const std::string& setting : recipe.withheld) remember(hash_text(recipe.settings.at(setting)), recipe.settings.at(setting));
     io.end_progress();

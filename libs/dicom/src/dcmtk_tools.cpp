@@ -2,6 +2,7 @@
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/oflog/oflog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <mutex>
 
@@ -31,6 +32,34 @@ std::string uid_of(const std::string& hex) {
     number = quotient;
   }
   return "2.25." + digits;
+}
+
+std::string valid_uid(const std::string& uid) {
+  return DcmUniqueIdentifier::checkStringValue(uid.c_str(), "1").good() ? uid : uid_of(hash_text(uid));
+}
+
+void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context& context) {
+  const auto first = std::find_if(source.headers.begin(), source.headers.end(), [](const auto& h) { return h.usable(); });
+  if (first == source.headers.end() || file.loadFile(first->file.c_str(), EXS_Unknown, EGL_noChange, 64).bad())
+    throw Error(ExitCode::corrupt, "the source series holds no slice that can be read");
+  DcmDataset& d = *file.getDataset();
+  delete d.remove(DCM_PixelData);
+  std::string names;
+  const auto told = [&](const DcmElement& e) { names += (names.empty() ? "" : ", ") + std::string(DcmTag(e.getTag()).getTagName()); };
+  for (unsigned long i = 0; i < d.card(); ++i) {
+    DcmElement* const e = d.getElement(i);
+    if (!e->isLeaf() || e->getGTag() > 0x0020) continue;
+    OFString text;
+    if (e->ident() == EVR_UI) {
+      if (e->getOFStringArray(text).bad() || text.empty() || e->checkValue("1").good()) continue;
+      told(*e);
+      require(e->putString(valid_uid(text.c_str()).c_str()), first->file);
+    } else if (e->getLength() > 0 && e->checkValue("1-n").bad()) {
+      told(*e);
+      require(e->putString(""), first->file);
+    }
+  }
+  if (!names.empty()) context.warn("values of the source that DICOM does not allow are not taken over: " + names);
 }
 
 void require(const OFCondition& condition, const fs::path& path) {

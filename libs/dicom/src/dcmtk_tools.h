@@ -2,8 +2,10 @@
 #pragma once
 #include <string>
 
+#include "osteo/base/context.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/dicom/scan.h"
 
 namespace osteo::dicom {
 
@@ -17,6 +19,14 @@ void quiet_dcmtk();
 [[nodiscard]] std::string uid_of(const std::string& hex);
 
 void require(const OFCondition& condition, const fs::path& path);
+
+/// The UID, or where it is none, a valid one made from it.
+[[nodiscard]] std::string valid_uid(const std::string& uid);
+
+/// What an object takes over from its source: the first usable slice without its pixels, and without values that DICOM does not allow (an
+/// invalid UID is replaced by valid_uid, any other such value is emptied). Their names are told as a warning. Error(corrupt) when there is
+/// no slice that can be read.
+void load_identity(const DicomSeries& source, DcmFileFormat& file, const Context& context);
 
 /// At most 16 characters, as DS asks.
 [[nodiscard]] std::string decimal(double value);

@@ -86,13 +86,13 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
   const bool jpeg2000 = ts.ends_with(".4.90") || ts.ends_with(".4.91"), jpeg_ls = ts.ends_with(".4.80") || ts.ends_with(".4.81");
   const Shape shape = shape_of(in, jpeg2000);
   if (shape.width != static_cast<unsigned>(h.columns) || shape.height != static_cast<unsigned>(h.rows) || shape.components != 1 ||
-      shape.precision < 2 || shape.precision > 16) {
+      shape.precision < (h.bits_allocated == 1 ? 1U : 2U) || shape.precision > 16) {
     throw PixelError("its compressed pixels are damaged: they are no " + std::to_string(h.columns) + "x" + std::to_string(h.rows) +
                      " grey picture");
   }
   const unsigned short stored = static_cast<unsigned short>(shape.precision);
   // GDCM chooses its JPEG decoder (8, 12 or 16 bits) by this.
-  const unsigned short allocated = static_cast<unsigned short>(jpeg2000 || jpeg_ls ? h.bits_allocated
+  const unsigned short allocated = static_cast<unsigned short>(jpeg2000 || jpeg_ls ? std::max(8, h.bits_allocated)
                                                                : stored <= 8       ? 8
                                                                : stored <= 12      ? 12
                                                                                    : 16);
@@ -124,7 +124,7 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
     }
     if (jpeg_ls) {
       gdcm::JPEGLSCodec codec;
-      codec.SetBufferLength(static_cast<unsigned long>(h.bytes_per_frame()));
+      codec.SetBufferLength(static_cast<unsigned long>(h.pixels_per_frame() * static_cast<std::size_t>(std::max(8, h.bits_allocated) / 8)));
       return run(codec);
     }
     gdcm::JPEGCodec codec;
@@ -226,7 +226,7 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
   const std::size_t n = h.pixels_per_frame();
   std::vector<std::uint16_t> values(n);
   const auto take = [&](const char* p, std::size_t count) {
-    if (count >= 2 * n && h.bits_allocated != 8) {
+    if (count >= 2 * n && h.bits_allocated > 8) {
       std::memcpy(values.data(), p, 2 * n);
     } else if (count >= n && count < 2 * n) {
       for (std::size_t i = 0; i < n; ++i) values[i] = static_cast<std::uint8_t>(p[i]);
@@ -247,6 +247,14 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
     const auto* const from = reinterpret_cast<const unsigned char*>(in.data());
     if (h.bits_allocated == 16) {
       good = codec.Decode(format, from, in.size(), reinterpret_cast<unsigned char*>(values.data()), 2 * n) == 0;
+    } else if (h.bits_allocated == 1) {
+      // Bits are packed into bytes, and those are what is encoded.
+      std::vector<unsigned char> packed((n + 7) / 8);
+      format.Rows = 1;
+      format.Columns = static_cast<unsigned short>(packed.size());
+      format.BitsAllocated = format.BitsStored = 8;
+      good = packed.size() <= 65535 && codec.Decode(format, from, in.size(), packed.data(), packed.size()) == 0;
+      for (std::size_t i = 0; good && i < n; ++i) values[i] = packed[i / 8] >> (i % 8) & 1;
     } else {
       std::vector<char> out(h.bytes_per_frame());
       good = codec.Decode(format, from, in.size(), reinterpret_cast<unsigned char*>(out.data()), out.size()) == 0;
@@ -256,14 +264,6 @@ std::vector<std::uint16_t> CompressedFrames::decode(int frame) const {
     good = decode_with_gdcm(h, in, take);
   }
   if (!good) throw PixelError("its compressed pixels are damaged");
-  // Codecs leave the bits above the sign bit as they please.
-  const int sign = h.bits_stored - 1;
-  if (h.is_signed && sign > 0 && sign < 15) {
-    for (auto& v : values) {
-      const int low = v & ((2 << sign) - 1);
-      v = static_cast<std::uint16_t>(low >> sign != 0 ? low - (2 << sign) : low);
-    }
-  }
   return values;
 }
 

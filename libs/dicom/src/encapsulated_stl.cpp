@@ -25,7 +25,7 @@ void put_code(DcmItem& d, const DcmTagKey& sequence, const char* value, const ch
 }
 
 // Patient and study are the source's, or nobody's.
-void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string& content, const fs::path& path) {
+void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string& content, const fs::path& path, const Context& context) {
   static const DcmTagKey kTaken[] = {
       DCM_SpecificCharacterSet,  DCM_PatientName,      DCM_PatientID,           DCM_PatientBirthDate,           DCM_PatientSex,
       DCM_StudyInstanceUID,      DCM_StudyDate,        DCM_StudyTime,           DCM_ReferringPhysicianName,     DCM_StudyID,
@@ -44,32 +44,29 @@ void put_identity(DcmDataset& d, const DicomObjectOptions& o, const std::string&
     put(d, DCM_DeidentificationMethod, "Made without the source's identity", path);
     return;
   }
-  const auto first = std::find_if(o.source->headers.begin(), o.source->headers.end(), [](const auto& h) { return h.usable(); });
   DcmFileFormat source;
-  if (first == o.source->headers.end() || source.loadFile(first->file.c_str(), EXS_Unknown, EGL_noChange, 64).bad()) {
-    throw Error(ExitCode::corrupt, "the source series holds no slice that can be read");
-  }
+  dicom::load_identity(*o.source, source, context);
   for (const auto& tag : kTaken) {
     OFString value;
     if (source.getDataset()->findAndGetOFStringArray(tag, value).good() && !value.empty()) put(d, tag, value.c_str(), path);
   }
   DcmItem *item = nullptr, *series = nullptr;
   dicom::require(d.findOrCreateSequenceItem(DCM_ReferencedSeriesSequence, series, 0), path);
-  put(*series, DCM_SeriesInstanceUID, o.source->uid, path);
+  put(*series, DCM_SeriesInstanceUID, dicom::valid_uid(o.source->uid), path);
   for (const DicomHeader& h : o.source->headers) {
     if (!h.usable()) continue;
     dicom::require(d.findOrCreateSequenceItem(DCM_SourceInstanceSequence, item, -2), path);
     put(*item, DCM_ReferencedSOPClassUID, h.sop_class, path);
-    put(*item, DCM_ReferencedSOPInstanceUID, h.sop_uid, path);
+    put(*item, DCM_ReferencedSOPInstanceUID, dicom::valid_uid(h.sop_uid), path);
     dicom::require(series->findOrCreateSequenceItem(DCM_ReferencedInstanceSequence, item, -2), path);
     put(*item, DCM_ReferencedSOPClassUID, h.sop_class, path);
-    put(*item, DCM_ReferencedSOPInstanceUID, h.sop_uid, path);
+    put(*item, DCM_ReferencedSOPInstanceUID, dicom::valid_uid(h.sop_uid), path);
   }
 }
 
 }  // namespace
 
-void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const DicomObjectOptions& options) {
+void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
   if (mesh.triangles.empty()) throw Error(ExitCode::usage, "the surface is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   std::string stl = stl_text(mesh);
@@ -79,7 +76,7 @@ void save_encapsulated_stl(const TriMesh& mesh, const fs::path& path, const Dico
 
   DcmFileFormat file;
   DcmDataset& d = *file.getDataset();
-  put_identity(d, options, content, path);
+  put_identity(d, options, content, path, context);
   char date[16], time[16];
   const std::time_t now = std::time(nullptr);
   std::tm local{};

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -92,6 +93,34 @@ std::vector<std::string> identifying_values(vtkDICOMMetaData* meta) {
   return values;
 }
 
+// Spelling that means nothing: case, and the empty parts at a name's end.
+std::string patient_of(vtkDICOMMetaData* meta) {
+  std::string all;
+  for (const auto tag : {DC::PatientID, DC::IssuerOfPatientID, DC::PatientName, DC::PatientBirthDate}) {
+    std::string text = lower_case(text_of(meta, tag));
+    while (!text.empty() && (text.back() == '^' || text.back() == ' ' || text.back() == '=')) text.pop_back();
+    all += text + '\n';
+  }
+  return all;
+}
+
+// A word of its own that names a projection: "MIP", "MINIP", "MAX_IP", "Thin MIP 10mm"; no "MIPS".
+bool is_projection(const std::string& text) {
+  std::string word;
+  for (const char c : lower_case(text) + ' ') {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
+    }
+    if (c == '_' && (word == "max" || word == "min")) continue;
+    for (const char* const name : {"mip", "minip", "mipi", "maxip", "maxmip", "minmip"}) {
+      if (word == name) return true;
+    }
+    word.clear();
+  }
+  return false;
+}
+
 bool read_vec(const vtkDICOMValue& value, std::size_t at, Vec3& out) {
   if (value.GetNumberOfValues() < at + 3) return false;
   out = {value.GetDouble(at), value.GetDouble(at + 1), value.GetDouble(at + 2)};
@@ -118,6 +147,7 @@ DicomFrame read_frame(vtkDICOMMetaData* meta, int frame) {
   }
   if (const vtkDICOMValue& s = get(DC::RescaleSlope); s.IsValid() && s.GetNumberOfValues() > 0) f.slope = s.AsDouble();
   if (const vtkDICOMValue& s = get(DC::RescaleIntercept); s.IsValid() && s.GetNumberOfValues() > 0) f.intercept = s.AsDouble();
+  f.rescale_type = trimmed(get(DC::RescaleType).AsString());
   return f;
 }
 
@@ -126,6 +156,9 @@ std::optional<int> read_padding(const vtkDICOMValue& value, const DicomHeader& h
   if (!value.IsValid() || value.GetNumberOfValues() == 0) return {};
   int v = value.AsInt();
   if (h.bits_allocated == 16) v = h.is_signed ? static_cast<std::int16_t>(v) : static_cast<std::uint16_t>(v);
+  // As the pixels may be, it may be a negative number whose sign is not extended.
+  if (h.is_signed && h.bits_stored > 1 && h.bits_stored < 16 && v >= 1 << (h.bits_stored - 1) && v < 1 << h.bits_stored)
+    v -= 1 << h.bits_stored;
   return v;
 }
 
@@ -198,10 +231,16 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.series_uid = text_of(meta, DC::SeriesInstanceUID);
   h.study_uid = text_of(meta, DC::StudyInstanceUID);
   h.frame_of_reference_uid = text_of(meta, DC::FrameOfReferenceUID);
+  h.patient = patient_of(meta);
+  h.study_date = text_of(meta, DC::StudyDate);
+  h.study_description = text_of(meta, DC::StudyDescription);
   h.identifying = identifying_values(meta);
   h.modality = text_of(meta, DC::Modality);
   h.image_type = trimmed(meta->Get(DC::ImageType).AsString());
   h.description = text_of(meta, DC::SeriesDescription);
+  const std::string technique = text_of(meta, DC::VolumeBasedCalculationTechnique);
+  h.projection = is_projection(h.image_type) || is_projection(h.description) || technique == "MAX_IP" || technique == "MIN_IP" ||
+                 technique == "VOLUME_RENDER" || technique == "SURFACE_RENDER";
   h.kernel = text_of(meta, DC::ConvolutionKernel);
   h.manufacturer = text_of(meta, DC::Manufacturer);
   h.series_number = meta->Get(DC::SeriesNumber).AsInt();
@@ -221,8 +260,10 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.is_signed = meta->Get(DC::PixelRepresentation).AsInt() != 0;
   h.inverted = text_of(meta, DC::PhotometricInterpretation) == "MONOCHROME1";
   for (unsigned short group = 0x6000; group <= 0x601E; group = static_cast<unsigned short>(group + 2)) {
-    const vtkDICOMValue& bit = meta->Get(vtkDICOMTag(group, 0x0102));
-    if (bit.IsValid() && bit.AsInt() > h.high_bit) h.overlay_in_pixels = true;
+    const vtkDICOMValue &bit = meta->Get(vtkDICOMTag(group, 0x0102)), &bits = meta->Get(vtkDICOMTag(group, 0x0100));
+    if (!bit.IsValid()) continue;
+    const bool below = bits.AsInt() == h.bits_allocated && bit.AsInt() <= h.high_bit - h.bits_stored;
+    if (bit.AsInt() > h.high_bit || below) h.overlay_in_pixels = true;
   }
   h.padding = read_padding(meta->Get(DC::PixelPaddingValue), h);
   h.padding_limit = read_padding(meta->Get(DC::PixelPaddingRangeLimit), h);

@@ -4,6 +4,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/param.h"
 #include "osteo/dicom/volume.h"
 #include "osteo/io/volume_io.h"
 #include "pixels.h"
@@ -33,17 +34,18 @@ Mat3 direction_of(const std::string& axes) {
 }
 
 // A volume file says nothing of slices; its values are judged as those of a series are.
-Verdict judge_file(Image& image) {
+Verdict judge_file(Image& image, const ImportParams& params) {
   DicomHeader header;
   header.columns = image.frame.dims[0];
   header.rows = image.frame.dims[1];
   header.is_signed = true;
   header.bits_allocated = 16;
   header.frames.resize(1);
+  header.frames[0].intercept = params.hu_offset;
   dicom::ValueCount count;
   const std::size_t area = header.pixels_per_frame();
   const auto lowest = *std::min_element(image.span().begin(), image.span().end());
-  const auto out = lowest < dicom::kAirHu ? make_voxels<std::int16_t>(image.frame.voxel_count()) : nullptr;
+  const auto out = lowest < -1200 || params.hu_offset != 0 ? make_voxels<std::int16_t>(image.frame.voxel_count()) : nullptr;
   std::vector<std::int16_t> scratch(out ? 0 : area);
   for (int k = 0; k < image.frame.dims[2]; ++k) {
     std::int16_t* const to = out ? out.get() + static_cast<std::size_t>(k) * area : scratch.data();
@@ -53,7 +55,13 @@ Verdict judge_file(Image& image) {
   if (out) image.voxels = out;
   Verdict v;
   v.source = "volume file";
-  dicom::check_values(v, count, image.frame.voxel_volume_mm3());
+  v.output = image.frame;
+  if (params.hu_offset != 0) {
+    v.add(code::hu_offset, Severity::warning, format_number(params.hu_offset) + " HU are added to all values, as asked for",
+          "look at the mask before you rely on a threshold");
+  }
+  dicom::check_values(v, count, image.frame.voxel_volume_mm3(), params.any_modality);
+  if (v.refused()) throw Refused(v);
   return v;
 }
 
@@ -85,8 +93,7 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
   Imported result;
   if (!fs::is_directory(source) && is_volume_file(source)) {
     result.image = load_image(source, context);
-    result.verdict = judge_file(result.image);
-    result.verdict.output = result.image.frame;
+    result.verdict = judge_file(result.image, params);
   } else {
     if (fs::is_directory(source) && fs::is_empty(source)) {
       throw Error(ExitCode::no_input, "the folder '" + source.string() + "' is empty", "give the folder with the CT's slices");

@@ -7,29 +7,92 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "decode.h"
 
 namespace osteo::dicom {
 namespace {
 
-// Scanners mark what they did not measure with values that no tissue has; noise of air does not reach this far.
+// Scanners mark what they did not measure with one value that no tissue has, below the noise of air. Dark streaks beside metal come down
+// here as well, but with many values.
 constexpr double kPaddingBelowHu = -1200;
+constexpr double kSamePaddingHu = 8;
 // A padding tag that names a value above this names tissue.
 constexpr double kTissueFromHu = -900;
 constexpr std::int16_t kMetalHu = 3000;
 
-// Keeps the bits of the pixel where others hold an overlay.
+// The values of words: BitsStored bits up to HighBit, with their sign extended; what lies around them is no part of a pixel, and a file
+// need not extend the sign (PS3.5 8.1.1, C.7.6.3.1.2). Two errors of files are told from that by the pixels themselves: a HighBit that
+// leaves out bits which are in use, and a BitsStored that the values exceed.
 template <class T>
-void remove_overlay(const DicomHeader& h, T* p, std::size_t n) {
-  if (!h.overlay_in_pixels || h.bits_stored <= 0 || h.bits_stored >= static_cast<int>(8 * sizeof(T)) || h.high_bit + 1 < h.bits_stored)
-    return;
-  const int shift = h.high_bit + 1 - h.bits_stored;
-  const unsigned mask = (1U << h.bits_stored) - 1, sign = 1U << (h.bits_stored - 1);
-  for (std::size_t i = 0; i < n; ++i) {
-    const unsigned v = (static_cast<unsigned>(static_cast<std::make_unsigned_t<T>>(p[i])) >> shift) & mask;
-    p[i] = static_cast<T>(h.is_signed && (v & sign) != 0 ? v | ~mask : v);
+void take_stored_bits(const DicomHeader& h, T* p, std::size_t n, ValueCount& count) {
+  static_assert(std::is_unsigned_v<T>);
+  constexpr int kBits = 8 * sizeof(T);
+  const int stored = h.bits_stored;
+  if (stored <= 0 || stored >= kBits || h.high_bit >= kBits || h.high_bit + 1 < stored) return;
+  const T mask = static_cast<T>((T{1} << stored) - 1), sign = static_cast<T>(T{1} << (stored - 1));
+  const auto extended = [&](T v) { return static_cast<T>(h.is_signed && (v & sign) != 0 ? v | static_cast<T>(~mask) : v & mask); };
+
+  const int shift = h.high_bit + 1 - stored;
+  if (shift > 0) {
+    const T below = static_cast<T>((T{1} << shift) - 1);
+    bool in_use = false;
+    for (std::size_t i = 0; i < n && !h.overlay_in_pixels; ++i) in_use = in_use || (p[i] & below) != 0;
+    if (!in_use) {
+      for (std::size_t i = 0; i < n; ++i) p[i] = extended(static_cast<T>(p[i] >> shift));
+      return;
+    }
+    ++count.high_bit_wrong;
   }
+  // Nearly all files are in order, which is quickly seen: a sum moves what may lie above the stored bits to where it shows.
+  const T lowest = h.is_signed ? sign : T{0};
+  bool odd = false;
+  constexpr std::size_t kBlock = 4096;
+  for (std::size_t begin = 0; begin < n && !odd; begin += kBlock) {
+    T above = 0;
+    for (std::size_t i = begin; i < std::min(n, begin + kBlock); ++i)
+      above = static_cast<T>(above | (static_cast<T>(p[i] + lowest) & static_cast<T>(~mask)));
+    odd = above != 0;
+  }
+  if (!odd) return;
+
+  // Padding that its tag gives in more bits than are stored is no value either way.
+  const auto is_padding = [&](T word) {
+    if (!h.padding) return false;
+    const auto v = static_cast<std::int64_t>(h.is_signed ? static_cast<std::int64_t>(static_cast<std::make_signed_t<T>>(word))
+                                                         : static_cast<std::int64_t>(word));
+    const int end = h.padding_limit.value_or(*h.padding);
+    return v >= std::min(*h.padding, end) && v <= std::max(*h.padding, end);
+  };
+  const auto number = [&](T word) {
+    return h.is_signed ? static_cast<double>(static_cast<std::make_signed_t<T>>(word)) : static_cast<double>(word);
+  };
+  // Pictures change less from pixel to pixel than bits that do not belong to them do.
+  double by_tags = 0, by_words = 0;
+  const auto columns = static_cast<std::size_t>(h.columns);
+  std::uint64_t changed = 0, unextended = 0, too_low = 0;
+  const std::size_t most = h.overlay_in_pixels ? 0 : n;
+  for (std::size_t i = 0; i < most; ++i) {
+    const T w = p[i], v = extended(w);
+    changed += w != v ? 1 : 0;
+    unextended += w != v && static_cast<T>(w & static_cast<T>(~mask)) == 0 ? 1 : 0;
+    too_low += w != v && h.is_signed && static_cast<T>(w | mask) == static_cast<T>(~T{0}) ? 1 : 0;
+    if (i % columns == 0 || (w == v && p[i - 1] == extended(p[i - 1])) || is_padding(w) || is_padding(p[i - 1])) continue;
+    by_tags += std::abs(number(v) - number(extended(p[i - 1])));
+    by_words += std::abs(number(w) - number(p[i - 1]));
+  }
+  // Negative numbers whose sign is extended, but from further up.
+  const bool all_too_low = too_low > 0 && too_low == changed;
+  if (all_too_low || by_words < 0.5 * by_tags) {
+    count.bits_exceeded += changed;
+    return;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!is_padding(p[i])) p[i] = extended(p[i]);
+  }
+  count.sign_not_extended += unextended;
+  count.bits_foreign += changed - unextended;
 }
 
 class Converter {
@@ -51,12 +114,40 @@ class Converter {
   // `in` and `out` may be the same memory when T has two bytes.
   template <class T>
   void run(const T* in, std::int16_t* out, std::size_t columns, std::size_t rows) {
+    find_padding(in, columns * rows);
     if (count_.histogram.empty()) count_.histogram.assign(ValueCount::kBins, 0);
     for (std::size_t y = 0; y < rows; ++y) row(in + y * columns, out + y * columns, columns, y % 4 == 0);
     count_.pixels += columns * rows;
   }
 
  private:
+  // Up to two values (the corners of a picture, and what lies outside the table) that many pixels share, below all others.
+  template <class T>
+  void find_padding(const T* in, std::size_t n) {
+    T least = n > 0 ? in[0] : T{};
+    for (std::size_t i = 0; i < n; ++i) least = std::min(least, in[i]);
+    if (hounsfield(static_cast<double>(least), f_) >= kPaddingBelowHu) return;
+    const auto whole = [](double stored) { return static_cast<std::int64_t>(std::clamp(stored, -1e12, 1e12)); };
+    if (h_.lossy) {
+      // One value no longer: all that is as low.
+      found_ = whole(std::ceil((kPaddingBelowHu - f_.intercept) / f_.slope)) - 1;
+      return;
+    }
+    for (int found = 0; found < 2; ++found) {
+      std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::int64_t v = in[i];
+        if (v > found_ && v < lowest && !(v >= pad_lo_ && v <= pad_hi_)) lowest = v;
+      }
+      if (hounsfield(static_cast<double>(lowest), f_) >= kPaddingBelowHu) return;
+      const auto top = lowest + whole(kSamePaddingHu / f_.slope);
+      std::size_t same = 0;
+      for (std::size_t i = 0; i < n; ++i) same += in[i] >= lowest && in[i] <= top ? 1 : 0;
+      if (same < 16 || static_cast<double>(same) < 2e-4 * static_cast<double>(n)) return;
+      found_ = top;
+    }
+  }
+
   template <class T>
   void row(const T* in, std::int16_t* out, std::size_t n, bool sample) {
     std::int64_t lo = 1 << 30, hi = -(1 << 30);
@@ -69,12 +160,9 @@ class Converter {
     const bool whole = f_.slope == 1 && f_.intercept == std::floor(f_.intercept);
     const bool padded = pad_lo_ <= pad_hi_ && lo <= pad_hi_ && hi >= pad_lo_;
     const bool tissue = tissue_lo_ <= tissue_hi_ && lo <= tissue_hi_ && hi >= tissue_lo_;
-    if (whole && !padded && !tissue && low >= kPaddingBelowHu && high <= 32767) {
+    if (whole && !padded && !tissue && lo > found_ && low >= kPaddingBelowHu && high <= 32767) {
       const auto shift = static_cast<int>(f_.intercept);
-      for (std::size_t i = 0; i < n; ++i) {
-        const int v = static_cast<int>(in[i]) + shift;
-        out[i] = static_cast<std::int16_t>(v < kAirHu ? kAirHu : v);
-      }
+      for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::int16_t>(static_cast<int>(in[i]) + shift);
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(low));
     } else {
       careful_row(in, out, n);
@@ -91,7 +179,7 @@ class Converter {
     for (std::size_t i = 0; i < n; ++i) {
       const int bin = (out[i] + 1200) >> 2;
       // Air that the scanner cut off at -1024 is no peak of its own.
-      if (bin >= 0 && bin < ValueCount::kBins && out[i] > kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
+      if (bin >= 0 && bin < ValueCount::kBins && out[i] != kAirHu) ++count_.histogram[static_cast<std::size_t>(bin)];
     }
   }
 
@@ -107,15 +195,16 @@ class Converter {
         continue;
       }
       if (stored >= tissue_lo_ && stored <= tissue_hi_) ++count_.declared_tissue;
-      if (hu < kPaddingBelowHu) {
+      if (stored <= found_) {
         ++count_.found;
         count_.padding_hu = std::min(count_.padding_hu, hu);
         out[i] = kNoValue;
         continue;
       }
       if (hu > 32767) ++count_.out_of_range;
+      if (hu < kPaddingBelowHu) ++count_.below_air;
       count_.hu_min = std::min(count_.hu_min, static_cast<std::int64_t>(std::floor(hu + 0.5)));
-      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(hu + 0.5), static_cast<double>(kAirHu), 32767.0));
+      out[i] = static_cast<std::int16_t>(std::clamp(std::floor(hu + 0.5), -32767.0, 32767.0));
     }
   }
 
@@ -123,6 +212,7 @@ class Converter {
   const DicomFrame& f_;
   ValueCount& count_;
   std::int64_t pad_lo_ = 1, pad_hi_ = 0, tissue_lo_ = 1, tissue_hi_ = 0, top_ = 0;
+  std::int64_t found_ = std::numeric_limits<std::int64_t>::min();  // stored values up to this are padding that no tag names
 };
 
 }  // namespace
@@ -152,6 +242,11 @@ void ValueCount::add(const ValueCount& o) {
   out_of_range += o.out_of_range;
   saturated += o.saturated;
   metal += o.metal;
+  below_air += o.below_air;
+  high_bit_wrong += o.high_bit_wrong;
+  sign_not_extended += o.sign_not_extended;
+  bits_foreign += o.bits_foreign;
+  bits_exceeded += o.bits_exceeded;
   padding_hu = std::min(padding_hu, o.padding_hu);
   fractional = fractional || o.fractional;
   if (histogram.empty()) histogram.assign(kBins, 0);
@@ -167,7 +262,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     const CompressedFrames frames(h);
     for (const FrameTarget& t : targets) {
       std::vector<std::uint16_t> stored = frames.decode(t.frame);
-      remove_overlay(h, stored.data(), n);
+      // What codecs leave above the sign bit says nothing of the file.
+      ValueCount ignored;
+      take_stored_bits(h, stored.data(), n, ignored);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int16_t*>(stored.data()));
       } else {
@@ -181,6 +278,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     if (h.bits_allocated == 8) {
       std::vector<std::uint8_t> stored(n);
       read_bytes(h, offset, stored.data(), n);
+      take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int8_t*>(stored.data()));
       } else {
@@ -192,6 +290,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
       std::vector<std::uint32_t> stored(n);
       read_bytes(h, offset, stored.data(), n * 4);
       if (h.big_endian) std::transform(stored.begin(), stored.end(), stored.begin(), [](std::uint32_t v) { return __builtin_bswap32(v); });
+      take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
         convert(t, reinterpret_cast<const std::int32_t*>(stored.data()));
       } else {
@@ -203,7 +302,7 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     read_bytes(h, offset, t.out, n * 2);
     auto* const words = reinterpret_cast<std::uint16_t*>(t.out);
     if (h.big_endian) std::transform(words, words + n, words, [](std::uint16_t v) { return __builtin_bswap16(v); });
-    remove_overlay(h, t.out, n);
+    take_stored_bits(h, words, n, count);
     if (h.is_signed) {
       convert(t, t.out);
     } else {

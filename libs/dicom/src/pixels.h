@@ -18,7 +18,9 @@ inline constexpr std::int16_t kAirHu = -1024;
 struct ValueCount {
   static constexpr int kBins = 1100;  // 4 HU each, from -1200
   std::int64_t hu_min = 1 << 30, hu_max = -(1 << 30);
-  std::uint64_t pixels = 0, by_tag = 0, found = 0, declared_tissue = 0, out_of_range = 0, saturated = 0, metal = 0;
+  std::uint64_t pixels = 0, by_tag = 0, found = 0, declared_tissue = 0, out_of_range = 0, saturated = 0, metal = 0, below_air = 0;
+  // Words whose bits are not as the header says; frames for high_bit_wrong.
+  std::uint64_t high_bit_wrong = 0, sign_not_extended = 0, bits_foreign = 0, bits_exceeded = 0;
   double padding_hu = 0;    // as declared, or the lowest that was found
   bool fractional = false;  // slope or intercept are no whole numbers
   std::vector<std::uint32_t> histogram;
@@ -38,7 +40,7 @@ struct FrameTarget {
   std::int16_t* out = nullptr;
 };
 
-/// Each target gets pixels_per_frame() values: HU rounded to whole numbers, at least -1024; kNoValue for padding. A compressed file is
+/// Each target gets pixels_per_frame() values: HU rounded to whole numbers; kNoValue for padding. A compressed file is
 /// decoded once for all targets. Any thread. Throws PixelError.
 void read_frames_hu(const DicomHeader& header, std::span<const FrameTarget> targets, ValueCount& count);
 

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <map>
+#include <set>
 
+#include "osteo/base/files.h"
 #include "osteo/base/param.h"
 
 namespace osteo {
@@ -45,7 +48,11 @@ class Placer {
   [[nodiscard]] const DicomFrame& frame_of(const Candidate& c) const {
     return headers_[c.header].frames[static_cast<std::size_t>(c.frame)];
   }
-  [[nodiscard]] const std::string& name_of(const Candidate& c) const { return headers_[c.header].name; }
+  [[nodiscard]] std::string name_of(const Candidate& c) const { return name_of(c.header, c.frame); }
+  [[nodiscard]] std::string name_of(std::size_t header, int frame) const {
+    const DicomHeader& h = headers_[header];
+    return h.frames.size() > 1 ? h.name + " (picture " + std::to_string(frame + 1) + ")" : h.name;
+  }
   void set_aside(std::size_t header, std::string_view code, const std::string& why) {
     verdict().set_aside.push_back({headers_[header].name, std::string(code), why});
   }
@@ -157,8 +164,7 @@ class Placer {
     const auto number = [](int n) { return std::string(10 - std::min<std::size_t>(9, std::to_string(n).size()), ' ') + std::to_string(n); };
     for (const Parts& parts :
          {by([&](const DicomHeader& h) { return number(h.acquisition); }), by([](const DicomHeader& h) { return h.temporal; }),
-          by([](const DicomHeader& h) { return h.image_type; }), by([](const DicomHeader& h) { return h.kernel; }),
-          by([](const DicomHeader& h) { return h.frame_of_reference_uid; })}) {
+          by([](const DicomHeader& h) { return h.image_type; }), by([](const DicomHeader& h) { return h.kernel; })}) {
       if (parts.size() < 2) continue;
       const bool clean = std::none_of(parts.begin(), parts.end(), [](const auto& p) { return has_conflict(p.second); });
       if (!clean) continue;
@@ -322,6 +328,7 @@ class Placer {
     }
     Verdict& v = verdict();
     v.series = h.series_number;
+    if (!h.study_uid.empty() && !h.frame_of_reference_uid.empty()) v.scan_hash = hash_text(h.study_uid + '\n' + h.frame_of_reference_uid);
     v.modality = h.modality;
     v.kernel = h.kernel;
     v.columns = h.columns;
@@ -329,12 +336,22 @@ class Placer {
     v.pixel_mm[0] = f.column_spacing_mm;
     v.pixel_mm[1] = f.row_spacing_mm;
     v.thickness_mm = h.thickness_mm;
-    for (const Candidate& c : stack) v.slices.push_back({name_of(c), c.frame, frame_of(c).position_mm, c.along - first.along, 0});
+    for (const Candidate& c : stack)
+      v.slices.push_back({headers_[c.header].name, c.frame, frame_of(c).position_mm, c.along - first.along, 0});
     judge_gaps();
     judge_lean(stack);
+    judge_pictures(stack);
     compare_tags(h);
     if (stack.size() < 10) {
       v.add(code::few_slices, Severity::warning, "there are only " + std::to_string(stack.size()) + " slices");
+    }
+    std::set<std::string> spaces;
+    for (const Candidate& c : stack) spaces.insert(headers_[c.header].frame_of_reference_uid);
+    spaces.erase("");
+    if (spaces.size() > 1) {
+      v.add(code::frame_of_reference_wrong, Severity::warning,
+            "each of the slices names a frame of reference of its own, as careless anonymisation leaves them; they are taken as one scan",
+            "see that all slices are of one patient and one scan");
     }
     if (h.inverted) {
       v.add(code::monochrome1, Severity::info,
@@ -361,6 +378,13 @@ class Placer {
     for (std::size_t i = 0; i < gaps.size(); ++i) ones += step(i) == 1 ? 1 : 0;
     const bool numbered = ones * 2 > gaps.size();
 
+    // Positions written to tenths of a millimetre make distances of even slices wander by as much.
+    const auto equal = std::count_if(gaps.begin(), gaps.end(), [&](double g) { return std::abs(g - v.gap_usual_mm) <= kSamePlaceMm; });
+    tenths_ = equal * 5 < static_cast<std::ptrdiff_t>(gaps.size()) * 4 && std::all_of(s.begin(), s.end(), [](const PlacedSlice& p) {
+                return std::abs(p.along_mm * 10 - std::round(p.along_mm * 10)) < 1e-4;
+              });
+    const double slack = tenths_ ? 0.101 : 0;
+
     std::vector<std::string> files;
     std::string first_message;
     double widest = 0;
@@ -374,12 +398,12 @@ class Placer {
       if (near.empty()) near.push_back(gaps[i]);
       std::sort(near.begin(), near.end());
       double usual = near[near.size() / 2];
-      bool hole = gaps[i] > 1.5 * usual;
-      if (!hole && numbered && step(i) > 1 && gaps[i] > 1.5 * near.front()) {
+      bool hole = gaps[i] > 1.5 * usual + slack;
+      if (!hole && numbered && step(i) > 1 && gaps[i] > 1.5 * near.front() + slack) {
         hole = true;
         usual = near.front();
       }
-      const std::string &a = headers_[s[i].header].name, &b = headers_[s[i + 1].header].name;
+      const std::string a = name_of(s[i].header, s[i].frame), b = name_of(s[i + 1].header, s[i + 1].frame);
       if (!hole) {
         if (gaps[i] <= options_.max_gap_mm) continue;
         v.gaps.push_back({a, b, gaps[i], usual, 0, false});
@@ -410,32 +434,118 @@ class Placer {
           "copy the missing files from their source" + std::string(refuse ? "; --max-hole-mm accepts wider holes" : ""), files);
   }
 
+  // Whether the pictures are slices of Hounsfield units at all, and how sharp they are along the normal.
+  void judge_pictures(const std::vector<Candidate>& stack) {
+    Verdict& v = verdict();
+    const Severity grave = options_.any_modality ? Severity::warning : Severity::error;
+    const double thickness = v.thickness_mm, gap = v.gap_usual_mm;
+    if (std::any_of(stack.begin(), stack.end(), [&](const Candidate& c) { return headers_[c.header].projection; })) {
+      v.add(code::projection, grave,
+            "the pictures are projections (MIP): each shows the brightest or darkest of a slab" +
+                (thickness > 0 ? " of " + mm(thickness) : std::string()) + ", which makes bone too thick",
+            "choose the series of thin slices that they were made from");
+    } else if (thickness > 1.25 * gap && thickness > 0.5) {
+      const bool by_far = thickness >= 4 * gap && thickness >= 3;
+      v.add(code::slices_overlap, by_far ? Severity::warning : Severity::info,
+            "slices of " + mm(thickness) + " lie " + mm(gap) + " apart and overlap: along their normal nothing finer than " +
+                mm(thickness) + " is seen" +
+                (by_far ? "; slabs like these may also be maximum-intensity projections, which make bone too thick" : ""),
+            by_far ? "choose a series whose slices are as thick as they are apart" : "");
+    }
+    const auto other = std::find_if(stack.begin(), stack.end(), [&](const Candidate& c) {
+      const std::string type = upper_case(frame_of(c).rescale_type);
+      return !type.empty() && type != "HU" && type != "US";
+    });
+    if (other == stack.end()) return;
+    const std::string& type = frame_of(*other).rescale_type;
+    const bool modified = upper_case(type) == "HU_MOD";
+    v.add(code::rescale_type, modified ? Severity::warning : grave,
+          modified ? "the values are modified Hounsfield units (HU_MOD), as spectral scanners write them"
+                   : "the values are no Hounsfield units but '" + type + "' (RescaleType), as of a spectral or material map",
+          modified ? "look at the mask before you rely on a threshold" : "choose a series in Hounsfield units");
+  }
+
+  static std::string upper_case(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    return text;
+  }
+
+  static double median(std::vector<double> values) {
+    std::erase_if(values, [](double v) { return !std::isfinite(v); });
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  // Drift in mm per mm along the normal, and where it is at the first slice: a line through most slices, which single slices that are
+  // shifted do not turn (a line by least squares would call one shifted slice a tilt).
+  [[nodiscard]] std::pair<double, double> drift(std::size_t a) const {
+    const auto& s = result_.slices;
+    std::vector<double> slopes, rest;
+    for (std::size_t i = 1; i < s.size(); ++i)
+      slopes.push_back((s[i].sideways_mm[a] - s[i - 1].sideways_mm[a]) / (s[i].along_mm - s[i - 1].along_mm));
+    double slope = median(slopes);
+    const auto residuals = [&](double by) {
+      std::vector<double> r;
+      for (const PlacedSlice& slice : s) r.push_back(slice.sideways_mm[a] - by * slice.along_mm);
+      return r;
+    };
+    rest = residuals(slope);
+    double level = median(rest);
+    std::vector<double> off;
+    for (const double r : rest) off.push_back(std::abs(r - level));
+    // Positions rounded to tenths wander by as much; what is further off does not take part.
+    const double near = 0.06 + 3 * median(off);
+    double n = 0, mean = 0, mean_side = 0, zz = 0, zs = 0;
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      if (off[i] > near) continue;
+      n += 1;
+      mean += s[i].along_mm;
+      mean_side += s[i].sideways_mm[a];
+    }
+    if (n == 0) return {0, level};
+    mean /= n;
+    mean_side /= n;
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      if (off[i] > near) continue;
+      zz += (s[i].along_mm - mean) * (s[i].along_mm - mean);
+      zs += (s[i].along_mm - mean) * (s[i].sideways_mm[a] - mean_side);
+    }
+    // The least squares of these, where the steps from slice to slice agree with it as well: a step in the middle is no drift.
+    const double fitted = zz > 0 ? zs / zz : slope;
+    const auto agreeing = [&](double by) {
+      int count = 0;
+      for (std::size_t i = 1; i < s.size(); ++i) {
+        const double step = s[i].sideways_mm[a] - s[i - 1].sideways_mm[a] - by * (s[i].along_mm - s[i - 1].along_mm);
+        count += std::abs(step) <= 0.06 ? 1 : 0;
+      }
+      return count;
+    };
+    if (agreeing(fitted) * 10 >= agreeing(slope) * 9) slope = fitted;
+    return {slope, median(residuals(slope))};
+  }
+
   void judge_lean(const std::vector<Candidate>& stack) {
     Placement& p = result_;
     Verdict& v = verdict();
     const auto& s = p.slices;
-    double shear[2] = {0, 0}, sum_zz = 0, mean = 0, mean_side[2] = {0, 0};
     const auto n = static_cast<double>(s.size());
-    for (const auto& slice : s) {
-      mean += slice.along_mm / n;
-      for (int a = 0; a < 2; ++a) mean_side[a] += slice.sideways_mm[a] / n;
-    }
-    for (const auto& slice : s) {
-      sum_zz += (slice.along_mm - mean) * (slice.along_mm - mean);
-      for (int a = 0; a < 2; ++a) shear[a] += (slice.along_mm - mean) * (slice.sideways_mm[a] - mean_side[a]);
-    }
+    double shear[2] = {0, 0}, level[2] = {0, 0};
+    for (std::size_t a = 0; a < 2; ++a) std::tie(shear[a], level[a]) = drift(a);
     double jitter = 0, off = 0;
+    std::vector<std::string> shifted;
     const double pitch = s.back().along_mm / (n - 1);
-    for (int a = 0; a < 2; ++a) shear[a] /= sum_zz;
     for (std::size_t i = 0; i < s.size(); ++i) {
       double j2 = 0, side2 = 0;
       for (int a = 0; a < 2; ++a) {
-        const double r = s[i].sideways_mm[a] - mean_side[a] - shear[a] * (s[i].along_mm - mean);
+        const double r = s[i].sideways_mm[a] - level[a] - shear[a] * s[i].along_mm;
         j2 += r * r;
         side2 += s[i].sideways_mm[a] * s[i].sideways_mm[a];
       }
       const double along = s[i].along_mm - pitch * static_cast<double>(i);
       jitter = std::max(jitter, std::sqrt(j2));
+      if (j2 > 0.05 * 0.05) shifted.push_back(name_of(stack[i]));
       off = std::max(off, std::sqrt(along * along + side2));
     }
     p.even = off <= kSamePlaceMm;
@@ -455,13 +565,15 @@ class Placer {
     }
     if (jitter > 0.05) {
       v.add(code::shifted_sideways, Severity::warning,
-            "slices are shifted sideways against each other by up to " + mm(jitter) + "; each is taken where it says it lies",
-            "compare with the scanner's own pictures: a moved table is in the positions, a moved patient is not");
+            (shifted.size() == 1 ? "one slice ('" + shifted.front() + "') is shifted sideways by "
+                                 : std::to_string(shifted.size()) + " slices are shifted sideways against the others by up to ") +
+                mm(jitter) + "; each is taken where it says it lies",
+            "compare with the scanner's own pictures: a moved table is in the positions, a moved patient is not", shifted);
     }
     const bool uneven = v.gap_max_mm - v.gap_min_mm > 2 * kSamePlaceMm && !p.even;
     if (uneven && !v.has(code::slices_missing) && !v.has(code::hole_too_wide)) {
       // Positions rounded to a tenth of a millimetre are common, and no reason to worry anybody.
-      const bool rounding = v.gap_max_mm - v.gap_min_mm < std::min(0.11, 0.2 * v.gap_usual_mm);
+      const bool rounding = v.gap_max_mm - v.gap_min_mm < (tenths_ ? 0.11 : std::min(0.11, 0.2 * v.gap_usual_mm));
       v.add(code::gaps_uneven, rounding ? Severity::info : Severity::warning,
             "the slices are " + std::string(rounding ? "slightly " : "") + "unevenly spaced (" + mm(v.gap_min_mm) + " to " +
                 mm(v.gap_max_mm) + "); they are interpolated between their true places",
@@ -488,6 +600,7 @@ class Placer {
   const std::vector<FileSetAside>& excluded_;
   const std::function<bool(std::size_t, std::size_t)>& same_pixels_;
   Placement result_;
+  bool tenths_ = false;  ///< positions are rounded to tenths of a millimetre, and the distance of slices is no whole number of these
 };
 
 }  // namespace

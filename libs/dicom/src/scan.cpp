@@ -18,6 +18,7 @@
 #include "osteo/base/parallel.h"
 #include "osteo/base/param.h"
 #include "osteo/io/vtk_data.h"
+#include "pixels.h"
 #include "unpack.h"
 
 namespace osteo {
@@ -128,7 +129,10 @@ bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
 double cost(const DicomSeries& s, const Placement& p, std::string& why) {
   const bool bone = bone_kernel(s, s.headers.front().manufacturer);
   const bool axial = std::abs(p.normal.z) > 0.7;
-  const bool whole = !p.verdict.has(code::slices_missing) && p.verdict.set_aside.empty();
+  const bool whole = !p.verdict.has(code::slices_missing) &&
+                     std::all_of(p.verdict.set_aside.begin(), p.verdict.set_aside.end(), [](const FileSetAside& f) {
+                       return f.code == code::duplicate_file || f.code == code::duplicate_slice || f.code == code::localizer;
+                     });
   const bool original = s.headers.front().image_type.starts_with("ORIGINAL") || s.headers.front().image_type.empty();
   const double extent = p.slices.back().along_mm;
   why = "slices " + format_number(std::round(p.verdict.gap_usual_mm * 100) / 100) + " mm apart";
@@ -149,7 +153,12 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
     s.problem = "it is a localizer";
     return;
   }
-  const Placement p = place_slices(s.headers, options);
+  // A series over time has very many pictures at one place: there a look at some is enough for a list.
+  int asked = 0;
+  const Placement p = place_slices(s.headers, options, {}, [&](std::size_t a, std::size_t b) {
+    if (++asked <= 40) return dicom::same_stored_pixels(s.headers[a], s.headers[b]);
+    return !s.headers[a].sop_uid.empty() && s.headers[a].sop_uid == s.headers[b].sop_uid;
+  });
   s.gap_mm = p.verdict.gap_usual_mm;
   for (const Finding& f : p.verdict.findings) {
     if (f.severity != Severity::error) continue;
@@ -163,8 +172,98 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
   if (p.verdict.tilt_deg > 0.05) s.what += ", tilted";
   if (p.verdict.has(code::gaps_uneven)) s.what += ", uneven";
   if (p.verdict.has(code::slices_missing)) s.what += ", holes";
+  if (p.verdict.has(code::slices_overlap)) s.what += ", overlapping";
   if (p.verdict.stacks > 1) s.what += ", " + std::to_string(p.verdict.stacks) + " stacks";
   price = cost(s, p, s.why);
+}
+
+// A, B, ..., Z, AA, ...
+std::string letters(std::size_t n, char first) {
+  std::string text;
+  for (++n; n > 0; n = (n - 1) / 26) text.insert(text.begin(), static_cast<char>(first + (n - 1) % 26));
+  return text;
+}
+
+// The number of a key in the order of first appearance.
+class Numbering {
+ public:
+  std::size_t of(const std::string& key) { return numbers_.try_emplace(key, numbers_.size()).first->second; }
+
+ private:
+  std::map<std::string, std::size_t> numbers_;
+};
+
+// What a slice belongs to. Where each slice of a series has a frame of reference of its own, whoever wrote them meant nothing by it; a
+// slice without one is of the only one there is.
+std::vector<std::string> spaces_of(const std::vector<DicomHeader>& headers) {
+  std::map<std::string, int> count;
+  for (const DicomHeader& h : headers) {
+    if (!h.frame_of_reference_uid.empty()) ++count[h.frame_of_reference_uid];
+  }
+  const bool meaningless = std::all_of(count.begin(), count.end(), [](const auto& c) { return c.second == 1; });
+  std::vector<std::string> spaces;
+  for (const DicomHeader& h : headers) {
+    const std::string& uid = h.frame_of_reference_uid;
+    spaces.push_back(count.empty() ? "" : meaningless || (uid.empty() && count.size() == 1) ? count.begin()->first : uid);
+  }
+  return spaces;
+}
+
+// Series as their UIDs have them, parted where they hold several scans, each with its scan's name.
+std::vector<DicomSeries> part_by_scan(std::vector<DicomSeries> series) {
+  std::vector<DicomSeries> parted;
+  Numbering patients;
+  std::map<std::string, Numbering> studies, frames;
+  for (DicomSeries& s : series) {
+    const auto spaces = spaces_of(s.headers);
+    std::map<std::string, std::size_t> part_of;
+    const std::size_t first = parted.size();
+    for (std::size_t i = 0; i < s.headers.size(); ++i) {
+      DicomHeader& h = s.headers[i];
+      const std::string study = h.patient + '\n' + h.study_uid;
+      const std::string scan = letters(patients.of(h.patient), 'A') + std::to_string(studies[h.patient].of(study) + 1) +
+                               letters(frames[study].of(spaces[i]), 'a');
+      const auto [it, is_new] = part_of.try_emplace(scan, parted.size());
+      if (is_new) parted.emplace_back().scan = scan;
+      parted[it->second].headers.push_back(std::move(h));
+    }
+    for (std::size_t p = first; p < parted.size(); ++p) {
+      for (std::size_t q = first; q < parted.size(); ++q) {
+        if (p == q) continue;
+        for (const DicomHeader& h : parted[q].headers) {
+          if (h.usable()) parted[p].foreign.push_back(h.name);
+        }
+      }
+    }
+  }
+  return parted;
+}
+
+// The best usable series of each scan.
+void recommend(std::vector<DicomSeries>& series, const std::vector<double>& price) {
+  std::map<std::string, std::size_t> best;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (!series[i].usable) continue;
+    const auto [it, is_new] = best.try_emplace(series[i].scan, i);
+    if (!is_new && price[i] < price[it->second]) it->second = i;
+  }
+  for (const auto& [scan, i] : best) series[i].recommended = true;
+}
+
+std::string named(const DicomSeries& s) {
+  return s.scan + ":" + std::to_string(s.number);
+}
+
+// "2 patients", "2 studies of one patient", ...: the most that sets the scans apart.
+std::string what_differs(const std::vector<const DicomSeries*>& scans) {
+  std::set<std::string> patients, studies;
+  for (const DicomSeries* s : scans) {
+    patients.insert(s->scan.substr(0, s->scan.find_first_of("0123456789")));
+    studies.insert(s->scan.substr(0, s->scan.find_last_of("0123456789") + 1));
+  }
+  if (patients.size() > 1) return "of " + std::to_string(patients.size()) + " patients";
+  if (studies.size() > 1) return "of " + std::to_string(studies.size()) + " studies of one patient";
+  return "of one study, but in different frames of reference";
 }
 
 }  // namespace
@@ -214,6 +313,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     for (std::size_t i = begin; i < end; ++i) {
       headers[i] = read_dicom_header(found[i].file, scan.scratch->path());
       headers[i].name = found[i].name;
+      for (DicomFrame& f : headers[i].frames) f.intercept += options.hu_offset;
     }
     done += end - begin;
     context.progress(0.4 + 0.5 * static_cast<double>(done) / static_cast<double>(found.size()), "reading headers");
@@ -247,6 +347,7 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
   for (FileSetAside& f : scan.set_aside) {
     f.file = without_identity(f.file, identifying, "(name removed)");
   }
+  scan.series = part_by_scan(std::move(scan.series));
   const auto strays = std::make_shared<const std::vector<FileSetAside>>(scan.set_aside);
   // Pictures that could be of no volume go by name: a whole series of them is still worth a line.
   std::vector<double> price(scan.series.size(), 1e30);
@@ -258,6 +359,8 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     s.uid = h.series_uid;
     s.modality = h.modality;
     s.description = identifies(h.description, identifying) ? "(removed)" : h.description;
+    s.study_date = h.study_date;
+    s.study_description = identifies(h.study_description, identifying) ? "(removed)" : h.study_description;
     s.kernel = h.kernel;
     s.columns = h.columns;
     s.rows = h.rows;
@@ -273,23 +376,35 @@ DicomScan scan_dicom(const fs::path& source, const PlaceOptions& options, const 
     throw Error(ExitCode::no_input, "'" + source.string() + "' holds no DICOM image" + more,
                 "give the folder with the CT's slices, or a .nrrd, .nii.gz, .mha or .vti file");
   }
-  const auto best = std::min_element(price.begin(), price.end());
-  if (*best < 1e30) scan.series[static_cast<std::size_t>(best - price.begin())].recommended = true;
-  std::stable_sort(scan.series.begin(), scan.series.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+  recommend(scan.series, price);
+  std::stable_sort(scan.series.begin(), scan.series.end(),
+                   [](const auto& a, const auto& b) { return std::tie(a.scan, a.number) < std::tie(b.scan, b.number); });
   return scan;
 }
 
 const DicomSeries& choose_series(const DicomScan& scan, const std::string& wanted, const std::string& source_name) {
-  const DicomSeries* found = nullptr;
+  std::vector<const DicomSeries*> found;
   for (const DicomSeries& s : scan.series) {
-    if (!(wanted.empty() ? s.recommended : std::to_string(s.number) == wanted || s.uid == wanted)) continue;
-    if (found != nullptr && !wanted.empty()) {
-      throw Error(ExitCode::usage, "there are several series " + wanted,
-                  "'osteo import --list --json FOLDER' shows their UIDs: give one of those");
-    }
-    found = &s;
+    const bool asked_for = std::to_string(s.number) == wanted || s.uid == wanted || named(s) == wanted;
+    if (wanted.empty() || s.scan == wanted ? s.recommended : asked_for) found.push_back(&s);
   }
-  if (found != nullptr) return *found;
+  if (found.size() == 1) return *found.front();
+  if (found.size() > 1) {
+    std::string list;
+    for (const DicomSeries* s : found)
+      list += (list.empty() ? "" : "; ") + named(*s) + ": " + std::to_string(s->images) + " pictures, " + s->what;
+    if (!wanted.empty()) {
+      const bool same_scan = std::any_of(found.begin() + 1, found.end(), [&](const auto* s) { return s->scan == found.front()->scan; });
+      throw Error(ExitCode::usage, "there are several series " + wanted + " (" + list + ")",
+                  same_scan ? "'osteo import --list --json FOLDER' shows their UIDs: give one of those"
+                            : "give --series " + named(*found.front()) + " or another of these");
+    }
+    throw Error(ExitCode::corrupt,
+                "'" + source_name + "' holds " + std::to_string(found.size()) + " scans that do not belong together, " +
+                    what_differs(found) + " (" + list + ")",
+                "choose one, like --series " + found.front()->scan +
+                    "; 'osteo import --list FOLDER' shows all series, --studies the date and description of each study");
+  }
   // When there is but one, its own verdict says more than a list.
   if (wanted.empty() && scan.series.size() == 1) return scan.series.front();
   std::string list;

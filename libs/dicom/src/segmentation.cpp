@@ -8,15 +8,16 @@
 #include <dcmtk/dcmfg/fgseg.h>
 #include <dcmtk/dcmseg/segdoc.h>
 #include <dcmtk/dcmseg/segment.h>
-#include <dcmtk/dcmseg/segutils.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include "dcmtk_tools.h"
+#include "decode.h"
 #include "osteo/base/param.h"
 #include "osteo/dicom/objects.h"
+#include "pixels.h"
 
 namespace osteo {
 namespace {
@@ -110,11 +111,12 @@ Stack stack_on_source(const Labels& labels, const DicomSeries& source) {
   return s;
 }
 
-void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content, const fs::path& path) {
+void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const std::string& content, const fs::path& path,
+                        const Context& context) {
   if (o.source != nullptr) {
-    const auto first = std::find_if(o.source->headers.begin(), o.source->headers.end(), [](const auto& h) { return h.usable(); });
-    if (first == o.source->headers.end()) throw Error(ExitCode::corrupt, "the source series holds no slice");
-    require(seg.importFromSourceImage(first->file.c_str()), path);
+    DcmFileFormat source;
+    dicom::load_identity(*o.source, source, context);
+    require(seg.importFromSourceImage(*source.getDataset()), path);
   } else {
     require(seg.getPatient().setPatientName(dicom::kAnonymousName), path);
     require(seg.getPatient().setPatientID(dicom::kAnonymousId), path);
@@ -129,18 +131,19 @@ void take_over_identity(DcmSegmentation& seg, const DicomObjectOptions& o, const
 
 void refer_to_series(DcmSegmentation& seg, const DicomSeries& source) {
   auto* const item = new IODSeriesAndInstanceReferenceMacro::ReferencedSeriesItem();
-  item->setSeriesInstanceUID(source.uid.c_str());
+  item->setSeriesInstanceUID(dicom::valid_uid(source.uid).c_str());
   for (const DicomHeader& h : source.headers) {
     if (!h.usable()) continue;
     auto* const instance = new SOPInstanceReferenceMacro();
     instance->setReferencedSOPClassUID(h.sop_class.c_str());
-    instance->setReferencedSOPInstanceUID(h.sop_uid.c_str());
+    instance->setReferencedSOPInstanceUID(dicom::valid_uid(h.sop_uid).c_str());
     item->getReferencedInstanceItems().push_back(instance);
   }
   seg.getCommonInstanceReference().getReferencedSeriesItems().push_back(item);
 }
 
-void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path, const DicomObjectOptions& o) {
+void write(const Stack& stack, const std::vector<Structure>& structures, const fs::path& path, const DicomObjectOptions& o,
+           const Context& context) {
   if (stack.planes.empty()) throw Error(ExitCode::usage, "the label map is empty: there is nothing to write to '" + path.string() + "'");
   dicom::quiet_dcmtk();
   Hasher hasher;
@@ -157,7 +160,7 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
                                                     identity),
           path);
   const std::unique_ptr<DcmSegmentation> seg(made);
-  take_over_identity(*seg, o, content, path);
+  take_over_identity(*seg, o, content, path, context);
   if (o.source != nullptr) refer_to_series(*seg, *o.source);
 
   for (const Structure& s : structures) {
@@ -216,7 +219,7 @@ void write(const Stack& stack, const std::vector<Structure>& structures, const f
           const DicomHeader& h = o.source->headers[index];
           DcmDataset reference;
           reference.putAndInsertString(DCM_SOPClassUID, h.sop_class.c_str());
-          reference.putAndInsertString(DCM_SOPInstanceUID, h.sop_uid.c_str());
+          reference.putAndInsertString(DCM_SOPInstanceUID, dicom::valid_uid(h.sop_uid).c_str());
           SourceImageItem* image = nullptr;
           const CodeSequenceMacro purpose("121322", "DCM", "Source image for image processing operation");
           require(derived->addSourceImageItem(&reference, purpose, image), path);
@@ -241,23 +244,51 @@ bool read_position(DcmSegmentation& seg, Uint32 frame, Vec3& position) {
   return fg != nullptr && fg->getImagePositionPatient(position.x, position.y, position.z).good();
 }
 
-}  // namespace
-
-void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options) {
-  write(stack_of(labels, options.source), structures_of(labels), path, options);
+// Compressed pixels of a segmentation as they would be uncompressed.
+void unpack_pixels(const fs::path& path, DcmDataset& d) {
+  const TemporaryFolder scratch;
+  DicomHeader h = read_dicom_header(path, scratch.path());
+  if (h.frames.empty() || h.columns <= 0 || h.rows <= 0) throw dicom::PixelError("it holds no pixels");
+  if (h.bits_allocated != 1 && h.bits_allocated != 8)
+    throw dicom::PixelError(std::to_string(h.bits_allocated) + " bits a pixel are no segmentation's");
+  const bool bits = h.bits_allocated == 1;
+  const dicom::CompressedFrames frames(h);
+  const std::size_t area = h.pixels_per_frame();
+  std::vector<Uint8> pixels(bits ? (area * h.frames.size() + 15) / 16 * 2 : (area * h.frames.size() + 1) / 2 * 2);
+  for (std::size_t f = 0; f < h.frames.size(); ++f) {
+    const std::vector<std::uint16_t> values = frames.decode(static_cast<int>(f));
+    for (std::size_t i = 0, at = f * area; i < area; ++i, ++at) {
+      if (!bits) {
+        pixels[at] = static_cast<Uint8>(values[i]);
+      } else if (values[i] != 0) {
+        pixels[at / 8] = static_cast<Uint8>(pixels[at / 8] | 1U << (at % 8));
+      }
+    }
+  }
+  delete d.remove(DCM_PixelData);
+  require(d.chooseRepresentation(EXS_LittleEndianExplicit, nullptr), path);
+  d.updateOriginalXfer();
+  require(d.putAndInsertUint8Array(DCM_PixelData, pixels.data(), static_cast<unsigned long>(pixels.size())), path);
 }
 
-void save_segmentation_on_source(const Labels& labels, const fs::path& path, const DicomObjectOptions& options) {
+}  // namespace
+
+void save_segmentation(const Labels& labels, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
+  write(stack_of(labels, options.source), structures_of(labels), path, options, context);
+}
+
+void save_segmentation_on_source(const Labels& labels, const fs::path& path, const DicomObjectOptions& options, const Context& context) {
   if (options.source == nullptr) throw Error(ExitCode::usage, "a segmentation on the slices of its source needs the source series");
-  write(stack_on_source(labels, *options.source), structures_of(labels), path, options);
+  write(stack_on_source(labels, *options.source), structures_of(labels), path, options, context);
 }
 
 bool is_segmentation(const fs::path& path) {
   dicom::quiet_dcmtk();
   OFString uid;
   DcmFileFormat file;
-  if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_metaOnly).bad()) return false;
-  return file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() && uid == UID_SegmentationStorage;
+  if (file.loadFile(path.c_str(), EXS_Unknown, EGL_noChange, 64, ERM_fileOnly).bad()) return false;
+  return (file.getMetaInfo()->findAndGetOFString(DCM_MediaStorageSOPClassUID, uid).good() && uid == UID_SegmentationStorage) ||
+         (file.getDataset()->findAndGetOFString(DCM_SOPClassUID, uid).good() && uid == UID_SegmentationStorage);
 }
 
 Labels load_segmentation(const fs::path& path, const Context& context) {
@@ -265,7 +296,17 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
   dicom::quiet_dcmtk();
   const auto fail = [&](const std::string& why) { return Error(ExitCode::corrupt, "'" + path.string() + "': " + why); };
   DcmSegmentation* loaded = nullptr;
-  const OFCondition status = DcmSegmentation::loadFile(path.c_str(), loaded);
+  DcmFileFormat file;
+  OFCondition status = file.loadFile(path.c_str());
+  if (status.bad()) throw fail(std::string("it cannot be read: ") + status.text());
+  if (DcmXfer(file.getDataset()->getOriginalXfer()).isEncapsulated()) {
+    try {
+      unpack_pixels(path, *file.getDataset());
+    } catch (const dicom::PixelError& e) {
+      throw fail(e.what());
+    }
+  }
+  status = DcmSegmentation::loadDataset(*file.getDataset(), loaded);
   const std::unique_ptr<DcmSegmentation> seg(loaded);
   if (status.bad() || !seg) throw fail(std::string("it cannot be read as a DICOM segmentation: ") + status.text());
   const auto frames = static_cast<Uint32>(seg->getNumberOfFrames());
@@ -274,14 +315,11 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
     throw fail("it holds " + std::to_string(seg->getNumberOfSegments()) + " segments; up to 255 are supported");
 
   Uint16 rows = 0, columns = 0;
-  const Uint8* plain = nullptr;  // packed bits, where they are not compressed: DCMTK 3.6.7 shifts frames that are no multiple of 8
-  unsigned long plain_bytes = 0;
-  DcmFileFormat file;
-  file.loadFile(path.c_str());
+  const Uint8* pixels = nullptr;  // read here: DCMTK 3.6.7 shifts frames of bits that are no multiple of 8
+  unsigned long pixel_bytes = 0;
   file.getDataset()->findAndGetUint16(DCM_Rows, rows);
   file.getDataset()->findAndGetUint16(DCM_Columns, columns);
-  if (!DcmXfer(file.getDataset()->getOriginalXfer()).isEncapsulated())
-    file.getDataset()->findAndGetUint8Array(DCM_PixelData, plain, &plain_bytes);
+  file.getDataset()->findAndGetUint8Array(DCM_PixelData, pixels, &pixel_bytes);
   auto* const orientation =
       OFstatic_cast(FGPlaneOrientationPatient*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PLANEORIENTPATIENT));
   auto* const measures = OFstatic_cast(FGPixelMeasures*, seg->getFunctionalGroups().get(0, DcmFGTypes::EFG_PIXELMEASURES));
@@ -336,7 +374,11 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
     labels.structures.push_back(
         {static_cast<std::uint8_t>(s), name.empty() ? "Segment " + std::to_string(s) : std::string(name.c_str()), {}});
   }
-  const bool binary = seg->getSegmentationType() == DcmSegTypes::ST_BINARY;
+  Uint16 allocated = 1, full = 255;
+  file.getDataset()->findAndGetUint16(DCM_BitsAllocated, allocated);
+  file.getDataset()->findAndGetUint16(DCM_MaximumFractionalValue, full);
+  const bool bits = allocated == 1, binary = seg->getSegmentationType() == DcmSegTypes::ST_BINARY;
+  const int half = binary ? 1 : (full + 1) / 2;
   const std::size_t area = static_cast<std::size_t>(rows) * columns;
   const auto voxels = make_voxels<std::uint8_t>(f.voxel_count());
   std::fill_n(voxels.get(), f.voxel_count(), std::uint8_t{0});
@@ -352,21 +394,9 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
       overlap += out[p] != 0 ? 1 : 0;
       out[p] = static_cast<std::uint8_t>(number);
     };
-    if (binary && plain != nullptr) {
-      if (plain_bytes * 8 < (i + 1) * area) throw fail("frame " + std::to_string(i + 1) + " is cut short");
-      for (std::size_t p = 0, bit = i * area; p < area; ++p, ++bit) {
-        if ((plain[bit / 8] >> (bit % 8) & 1) != 0) mark(p);
-      }
-      continue;
-    }
-    const DcmIODTypes::Frame* const packed = seg->getFrame(i);
-    if (packed == nullptr) throw fail("frame " + std::to_string(i + 1) + " is missing");
-    std::unique_ptr<DcmIODTypes::Frame> unpacked;
-    if (binary) unpacked.reset(DcmSegUtils::unpackBinaryFrame(packed, rows, columns));
-    const DcmIODTypes::Frame* const frame = binary ? unpacked.get() : packed;
-    if (frame == nullptr || frame->length < area) throw fail("frame " + std::to_string(i + 1) + " is cut short");
-    for (std::size_t p = 0; p < area; ++p) {
-      if (frame->pixData[p] >= (binary ? 1 : 128)) mark(p);
+    if (pixels == nullptr || pixel_bytes * (bits ? 8 : 1) < (i + 1) * area) throw fail("frame " + std::to_string(i + 1) + " is cut short");
+    for (std::size_t p = 0, at = i * area; p < area; ++p, ++at) {
+      if (bits ? (pixels[at / 8] >> (at % 8) & 1) != 0 : pixels[at] >= half) mark(p);
     }
   }
   if (overlap > 0) context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");

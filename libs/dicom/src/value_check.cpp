@@ -35,7 +35,28 @@ std::string whole(double v) {
 
 }  // namespace
 
-void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
+namespace {
+
+// How much of a body bone can be: a skull fills up to 45 cm2 of each slice on average, a pelvis 60. More is soft tissue or air on a wrong
+// scale, or a threshold that is not bone's.
+constexpr double kMostBoneCm2 = 80, kBoneHu = 300;
+
+void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double total, double voxel_mm3, double pixels) {
+  double bone = 0;
+  for (int i = bin_of(kBoneHu); i < ValueCount::kBins; ++i) bone += histogram[static_cast<std::size_t>(i)];
+  const double bone_mm3 = bone / std::max(total, 1.0) * pixels * voxel_mm3;
+  double height_mm = 0;
+  for (std::size_t a = 0; a < 3; ++a) height_mm += std::abs(v.output.direction.column[a].z) * v.output.spacing_mm[a] * v.output.dims[a];
+  if (height_mm <= 0 || bone_mm3 / height_mm <= kMostBoneCm2 * 100) return;
+  v.add(code::bone_implausible, Severity::warning,
+        whole(bone_mm3 / 1000) + " cm3 are at " + whole(kBoneHu) + " HU or above, " + whole(bone_mm3 / height_mm / 100) +
+            " cm2 of each slice on average: more than a body has bone",
+        "see whether the values are Hounsfield units, and look at the mask ('osteo snapshot')");
+}
+
+}  // namespace
+
+void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool any_values) {
   ValueCheck& c = v.values;
   c.checked = true;
   c.hu_min = count.hu_min;
@@ -43,6 +64,28 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
   c.rounding_error_hu = count.fractional ? 0.5 : 0;
   if (count.fractional) {
     v.add(code::values_rounded, Severity::info, "the HU scale is fractional; values are rounded to whole HU, at most 0.5 HU off");
+  }
+
+  if (count.sign_not_extended > 0) {
+    v.add(
+        code::sign_not_extended, Severity::info,
+        "the sign of " + std::to_string(count.sign_not_extended) + " negative pixels is not extended above their stored bits; it is here");
+  }
+  if (count.bits_foreign > 0) {
+    v.add(code::bits_foreign, Severity::info,
+          std::to_string(count.bits_foreign) + " pixels have other bits above HighBit, such as an overlay; they are cleared");
+  }
+  if (count.bits_exceeded > 0) {
+    v.add(code::bits_stored_wrong, Severity::warning,
+          std::to_string(count.bits_exceeded) +
+              " pixels need more bits than the file says it stores (BitsStored), and fit their neighbours only with these: whole words are "
+              "taken",
+          "compare with the scanner's own pictures, near metal above all");
+  }
+  if (count.high_bit_wrong > 0) {
+    v.add(code::high_bit_wrong, Severity::warning,
+          "the file says that the lowest bits belong to no pixel (HighBit), but they are in use: the lowest BitsStored bits are taken",
+          "compare with the scanner's own pictures");
   }
 
   const double pixels = std::max<double>(1, static_cast<double>(count.pixels));
@@ -96,24 +139,45 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
   c.has_soft_tissue = soft.share > 0.01 && soft.share > 0.15 * std::max(above.share, under.share);
   c.air_hu = air.hu;
   c.soft_tissue_hu = soft.hu;
-  const bool air_right = c.has_air && air.hu > -1040 && air.hu < -940;
+  const auto between = [&](double lo, double hi) {
+    double n = 0;
+    for (int i = bin_of(lo); i < bin_of(hi); ++i) n += raw[static_cast<std::size_t>(i)];
+    return n;
+  };
+  // Lungs, where the scan shows nothing outside the body. The airways in them are air, well apart from the peak, which air on a smaller
+  // scale would not have.
+  int below = bin_of(air.hu);
+  while (below > 0 && smooth[static_cast<std::size_t>(below)] > 0.5 * smooth[static_cast<std::size_t>(bin_of(air.hu))]) --below;
+  const double half_width = air.hu - centre_of(below);
+  const double lung_share = 0.005 * between(-940, -600);
+  const bool lungs = c.has_air && air.hu >= -940 && between(-1060, std::min(-940.0, air.hu - 2.5 * half_width)) > lung_share;
+  // Much between air and tissue, and hardly a voxel of air: greys of another scale.
+  const bool no_true_air = !c.has_air && under.share > 0.2 && between(-1100, -940) < lung_share;
+  const bool air_right = c.has_air && ((air.hu > -1040 && air.hu < -940) || lungs);
   const bool soft_right = c.has_soft_tissue && soft.hu > -150 && soft.hu < 150;
   // Outside the scan the scanner may have cut everything off at -1024.
   const bool cut_air = c.padding_share > 0.01 || count.hu_min <= kAirHu;
   const Peak plus_air = peak_between(smooth, raw, total, 850, 1100);
   const bool turned = plus_air.share > 0.2 && std::abs(plus_air.hu - 1000) < 60 && plus_air.share > 2 * air.share;
   // No air at all but much "padding" far below it: air on a larger scale.
-  const bool no_air_left = !c.has_air && static_cast<double>(count.found) > 0.2 * pixels;
-  c.plausible = soft_right && !turned && !no_air_left && (air_right || (!c.has_air && count.hu_min < -200));
+  const bool no_air_left = !c.has_air && static_cast<double>(count.found + count.below_air) > 0.2 * pixels;
+  c.plausible = soft_right && !turned && !no_air_left && (air_right || (!c.has_air && !no_true_air && count.hu_min < -200));
+  check_bone(v, raw, total, voxel_mm3, pixels);
+  const Severity grave = any_values ? Severity::warning : Severity::error;
   const std::string range = std::to_string(count.hu_min) + " to " + std::to_string(count.hu_max);
+  if (count.below_air > 0) {
+    v.add(code::below_air, c.plausible ? Severity::info : Severity::warning,
+          std::to_string(count.below_air) + " pixels lie below -1200 HU (down to " + std::to_string(count.hu_min) + ") and are no padding" +
+              (c.plausible ? ": noise of air, or dark streaks beside metal; they are kept" : "; they are kept"),
+          c.plausible ? "" : "see whether the values are Hounsfield units");
+  }
   if (c.plausible) {
     if (!c.has_air && !cut_air) v.add(code::no_air, Severity::info, "there is no air in the pictures by which to check the HU scale");
     return;
   }
   const std::string advice = "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
   if (turned) {
-    v.add(code::hu_wrong_sign, Severity::error,
-          "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
+    v.add(code::hu_wrong_sign, grave, "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
           "the file states the wrong scale; ask for the original export");
     return;
   }
@@ -124,10 +188,14 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3) {
   const Peak& second = left.share > right.share ? left : right;
   const double apart = std::abs(first.hu - second.hu), low = std::min(first.hu, second.hu);
   if (second.share > 0.02 && apart > 940 && apart < 1130) {
-    v.add(code::hu_shifted, Severity::warning,
+    // Unsigned pixels whose intercept was left out begin at 0, which is -1024 by custom.
+    const double offset = count.hu_min == 0 && low < 80 ? -1024 : std::round(-1000 - low);
+    const bool small = std::abs(offset) < 200;
+    v.add(code::hu_shifted, small ? Severity::warning : grave,
           "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) + ", tissue at " +
-              whole(low + apart),
-          advice);
+              whole(low + apart) + "; " + whole(offset) + " HU added to each would put them right",
+          "--hu-offset " + whole(offset) + " adds it; 'osteo guide SCAN --hu-offset " + whole(offset) +
+              " --picture histogram.svg' shows the result first; or ask for the original export");
   } else if (second.share > 0.02 && apart > 400 && c.has_air) {
     v.add(code::hu_scaled, Severity::warning,
           "the values (" + range + ") look like HU on another scale: air at " + whole(low) + ", tissue at " + whole(low + apart), advice);

@@ -59,6 +59,7 @@ std::string to_json(const Verdict& v) {
     j["series"] = {{"number", v.series},     {"stack", v.stack},   {"stacks", v.stacks},
                    {"modality", v.modality}, {"kernel", v.kernel}, {"thickness_mm", tidy(v.thickness_mm)},
                    {"why", v.why_chosen}};
+    if (!v.scan_hash.empty()) j["series"]["scan_hash"] = v.scan_hash;
     j["geometry"] = {{"slices", v.slices.size()},
                      {"columns", v.columns},
                      {"rows", v.rows},
@@ -125,6 +126,8 @@ VerdictSummary read_verdict(std::string_view text) {
     };
     VerdictSummary summary;
     summary.status = text_of(file.root(), "status");
+    if (const JsonValue* const series = file.root().find("series"); series != nullptr && series->find("scan_hash") != nullptr)
+      summary.scan_hash = text_of(*series, "scan_hash");
     for (const JsonValue& f : file.list(file.need(file.root(), "", "findings"), "\"findings\"")) {
       Finding finding;
       finding.code = text_of(f, "code");

@@ -25,7 +25,7 @@ const Finding& first_error(const Verdict& v) {
 }
 
 std::string why(const Verdict& v) {
-  std::string text = "series " + std::to_string(v.series) + " is refused";
+  std::string text = v.source == "DICOM" ? "series " + std::to_string(v.series) + " is refused" : "the volume is refused";
   for (const Finding& f : v.findings) {
     if (f.severity == Severity::error) text += ": " + f.message + " [" + f.code + "]";
   }
@@ -42,6 +42,18 @@ Placement place_or_refuse(const DicomSeries& series, const PlaceOptions& options
   if (p.verdict.series == 0) p.verdict.series = series.number;
   if (p.verdict.modality.empty()) p.verdict.modality = series.modality;
   if (series.strays) p.verdict.set_aside.insert(p.verdict.set_aside.end(), series.strays->begin(), series.strays->end());
+  if (!series.foreign.empty()) {
+    p.verdict.add(code::several_scans, Severity::warning,
+                  "the series also holds " + std::to_string(series.foreign.size()) +
+                      " slices of another patient, study or frame of reference ('" + series.foreign.front() + "', ...); they are left out",
+                  "'osteo import --list FOLDER' shows which belong together", series.foreign);
+    for (const std::string& f : series.foreign)
+      p.verdict.set_aside.push_back({f, std::string(code::several_scans), "it is of another patient, study or frame of reference"});
+  }
+  if (options.hu_offset != 0) {
+    p.verdict.add(code::hu_offset, Severity::warning, format_number(options.hu_offset) + " HU are added to all values, as asked for",
+                  "look at the mask before you rely on a threshold");
+  }
   p.verdict.why_chosen = series.recommended ? series.why : "asked for";
   if (p.verdict.refused()) throw Refused(p.verdict);
   return p;
@@ -97,13 +109,13 @@ double layer_distance(const Placement& p) {
   return std::max(std::min(pitch, 0.5), std::min(p.column_spacing_mm, p.row_spacing_mm));
 }
 
-void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count) {
+void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count, const PlaceOptions& options) {
   Verdict& v = p.verdict;
   v.output = frame;
   for (std::size_t k = 0; k < v.slices.size(); ++k) {
     v.slices[k].output_index = v.resampled ? p.slices[k].along_mm / frame.spacing_mm.z : static_cast<double>(k);
   }
-  dicom::check_values(v, count, p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm);
+  dicom::check_values(v, count, p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm, options.any_modality);
   if (v.refused()) throw Refused(v);
 }
 
@@ -131,7 +143,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
       frame.spacing_mm = {p.column_spacing_mm, p.row_spacing_mm, mean_gap};
       frame.origin_mm = p.origin_mm;
       frame.direction = {{p.along_row, p.along_column, p.normal}};
-      finish(p, frame, reader.count());
+      finish(p, frame, reader.count(), options);
       if (p.verdict.values.padding_source != "none") {
         parallel_for(area * count, 1 << 18, context.threads, [&](std::size_t begin, std::size_t end) {
           std::replace(pixels.get() + begin, pixels.get() + end, dicom::kNoValue, dicom::kAirHu);
@@ -141,7 +153,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
     } else {
       const double dz = layer_distance(p);
       const Frame frame = lattice_of(p, columns, rows, {p.column_spacing_mm, p.row_spacing_mm, dz});
-      finish(p, frame, reader.count());
+      finish(p, frame, reader.count(), options);
       const SliceSampler sampler(p, columns, rows, frame);
       const auto out = make_voxels<std::int16_t>(frame.voxel_count());
       const auto nx = static_cast<std::size_t>(frame.dims[0]), ny = static_cast<std::size_t>(frame.dims[1]);
@@ -225,7 +237,7 @@ void DicomSlabs::run(int layers_each, const Context& context, const std::functio
       take(z0, layers, slab.data());
       context.progress((z0 + layers) * share, "resampling");
     }
-    finish(p, frame, reader.count());
+    finish(p, frame, reader.count(), impl_->options);
     impl_->verdict = p.verdict;
   });
 }

@@ -21,24 +21,28 @@ constexpr int kVoxels = BrickGrid::kVoxels;
 constexpr float kForcedHu = 100;
 
 constexpr float kTrace = 1.0F / 256;
+// A scan has voxels of every value between tissue and bone; a gap as wide as this is one of made, binned or two-level values.
+constexpr int kOpenHu = 20;
 
-// The threshold that the mask looks most like: the highest at which the fewest voxels differ from it.
-double lower_of_mask(const Image& ct, const Labels& mask) {
+// The thresholds that the mask looks most like: from the lowest to the highest at which the fewest voxels differ from it.
+std::pair<int, int> lower_of_mask(const Image& ct, const Labels& mask) {
   constexpr int kLow = -32768, kCount = 65536;
   std::vector<std::int64_t> balance(kCount);  // of each value: voxels in the mask less voxels outside
   for (std::size_t i = 0; i < ct.frame.voxel_count(); ++i)
     balance[static_cast<std::size_t>(ct.voxels[i] - kLow)] += mask.voxels[i] != 0 ? 1 : -1;
   // Raising the threshold past a value loses its mask voxels and is rid of its others.
   std::int64_t wrong = 0, best = 0;
-  int at = kLow;
+  int from = kLow, to = kLow;
   for (int v = 0; v + 1 < kCount; ++v) {
     wrong += balance[static_cast<std::size_t>(v)];
-    if (wrong < best || (wrong == best && balance[static_cast<std::size_t>(v)] == 0 && at == v + kLow)) {
+    if (wrong < best) {
       best = wrong;
-      at = v + 1 + kLow;
+      from = to = v + 1 + kLow;
+    } else if (wrong == best && balance[static_cast<std::size_t>(v)] == 0 && to == v + kLow) {
+      to = v + 1 + kLow;
     }
   }
-  return at;
+  return {from, to};
 }
 
 // HU above the boundary, negative outside bone.
@@ -328,9 +332,17 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   }
   ResampleParams p = given;
   if (p.lower == 0) {
-    p.lower = lower_of_mask(ct, mask);
-    context.report("lower_hu", p.lower);
+    const auto [from, to] = lower_of_mask(ct, mask);
+    // Where no value lies in between, half way is where blur would have put the boundary.
+    const bool open = to - from > kOpenHu;
+    p.lower = open ? (from + to) / 2 : to;
+    if (open) {
+      context.warn("every threshold from " + format_number(from) + " to " + format_number(to) +
+                   " HU gives this mask: the boundary of bone is put half way, at " + format_number(p.lower) +
+                   " HU; 'resample --lower' puts it elsewhere");
+    }
   }
+  context.report("lower_hu", p.lower);
   std::array<std::uint64_t, 3> cells{};
   for (std::size_t a = 0; a < 3; ++a)
     cells[a] = static_cast<std::uint64_t>(std::ceil(ct.frame.dims[a] * ct.frame.spacing_mm[a] / p.spacing_mm / BrickGrid::kEdge));
@@ -410,8 +422,10 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
   context.report("bone_voxels", static_cast<std::int64_t>(result.density.active_voxels));
   context.report("grid_memory_mb", static_cast<double>(result.density.memory_bytes) / 1e6);
   if (std::abs(change) > 1) {
-    context.warn("the volume of bone changed by " + format_number(std::round(change * 100) / 100) +
-                 " %: the bone is thinner than the voxels of " + format_number(p.spacing_mm) + " mm can hold");
+    const bool far = std::abs(offset) >= kOffsets.back();
+    context.warn("the volume of bone changed by " + format_number(std::round(change * 100) / 100) + " %: " +
+                 (far ? "a boundary at " + format_number(p.lower) + " HU is far from half way between tissue and bone"
+                      : "the bone is thinner than the voxels of " + format_number(p.spacing_mm) + " mm can hold"));
   }
   context.progress(1.0);
   return result;

@@ -80,7 +80,9 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
     context.report("dense_bone_hu", guide.dense_bone_hu);
     context.report("confidence", guide.confidence);
     context.report("change_percent_per_50_hu", chosen.change_percent);
-    if (guide.confidence < 0.5) {
+    if (!guide.doubt.empty()) {
+      context.warn(guide.doubt);
+    } else if (guide.confidence < 0.5) {
       context.warn("bone and tissue are hard to tell apart in this scan (confidence " +
                    format_number(std::round(guide.confidence * 100) / 100) + "): look at the mask before you rely on " +
                    format_number(p.lower) + " HU");

@@ -112,6 +112,7 @@ void inflate_into(std::span<const std::byte> packed, std::byte* out, std::size_t
 struct Header {
   std::map<std::string, std::string, std::less<>> fields;  // keys in lower case
   std::map<std::string, std::string> notes;
+  std::vector<std::string> list;    // of data files
   std::optional<std::size_t> body;  // where the voxels begin, unless they are in another file
 
   [[nodiscard]] std::string get(std::string_view key) const {
@@ -120,9 +121,44 @@ struct Header {
   }
 };
 
+// What "data file" names (teem.sourceforge.net/nrrd/format.html#detached): one file, "LIST [subdim]" with a name a line, or
+// "NAME%03d.EXT first last step [subdim]". Each holds as much as the others, one after the other along the slowest axis.
+std::vector<fs::path> data_files(const std::string& value, const std::vector<std::string>& list, const fs::path& path) {
+  std::vector<fs::path> files;
+  const auto add = [&](const std::string& name) { files.push_back(path.parent_path() / name); };
+  std::istringstream words(value);
+  std::string name;
+  words >> name;
+  const std::size_t sign = name.find('%');
+  if (name == "LIST") {
+    for (const std::string& line : list) add(line);
+  } else if (sign != std::string::npos) {
+    std::size_t end = sign + 1;
+    while (end < name.size() && name[end] >= '0' && name[end] <= '9') ++end;
+    const std::string width = name.substr(sign + 1, end - sign - 1);
+    long first = 0, last = 0, step = 0;
+    if (end >= name.size() || name[end] != 'd' || width.size() > 2 || name.find('%', end) != std::string::npos ||
+        !(words >> first >> last >> step) || step == 0 || (last - first) / step < 0 || (last - first) / step > 65536) {
+      fail(path, "the data files '" + value + "' are not like slice%03d.raw 1 100 1");
+    }
+    for (long n = first; step > 0 ? n <= last : n >= last; n += step) {
+      std::string number = std::to_string(std::abs(n));
+      const std::size_t wanted = width.empty() ? 0 : static_cast<std::size_t>(std::stoi(width));
+      const std::size_t missing = wanted > number.size() + (n < 0 ? 1 : 0) ? wanted - number.size() - (n < 0 ? 1 : 0) : 0;
+      number.insert(0, missing, width.starts_with('0') ? '0' : ' ');
+      add(name.substr(0, sign) + (n < 0 ? "-" : "") + number + name.substr(end + 1));
+    }
+  } else {
+    add(value);
+  }
+  if (files.empty()) fail(path, "its list of data files is empty");
+  return files;
+}
+
 Header parse_header(std::string_view all, const fs::path& path) {
   if (!all.starts_with("NRRD")) fail(path, "this is not an NRRD file");
   Header header;
+  bool listing = false;
   std::size_t at = all.find('\n');
   while (at != std::string_view::npos && ++at < all.size()) {
     const std::size_t end = all.find('\n', at);
@@ -134,6 +170,10 @@ Header parse_header(std::string_view all, const fs::path& path) {
       break;
     }
     if (line.starts_with('#')) continue;
+    if (listing) {
+      header.list.emplace_back(line);
+      continue;
+    }
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos) fail(path, "the header line '" + std::string(line.substr(0, 60)) + "' has no colon");
     if (line.substr(colon).starts_with(":=")) {
@@ -142,7 +182,9 @@ Header parse_header(std::string_view all, const fs::path& path) {
     }
     std::string_view value = line.substr(colon + 1);
     while (value.starts_with(' ') || value.starts_with('\t')) value.remove_prefix(1);
-    header.fields[lower_case(std::string(line.substr(0, colon)))] = std::string(value);
+    const std::string key = lower_case(std::string(line.substr(0, colon)));
+    listing = (key == "data file" || key == "datafile") && (value == "LIST" || value.starts_with("LIST "));
+    header.fields[key] = std::string(value);
   }
   return header;
 }
@@ -199,30 +241,34 @@ void read_place(const Header& header, Frame& frame, const fs::path& path) {
   }
 }
 
-// The name of the file that holds the voxels; empty when this one does.
-std::string data_file_of(const Header& header, const fs::path& path) {
+// The files that hold the voxels; empty when this one does.
+std::vector<fs::path> data_files_of(const Header& header, const fs::path& path) {
+  for (const char* const skip : {"byte skip", "byteskip", "line skip", "lineskip"}) {
+    if (!header.get(skip).empty() && header.get(skip) != "0")
+      fail(path, std::string("'") + skip + "' is not supported", "save it with its own header");
+  }
   std::string name = header.get("data file");
   if (name.empty()) name = header.get("datafile");
-  if (name.find('%') != std::string::npos || name == "LIST") fail(path, "several data files are not supported");
-  if (name.empty() && !header.body) fail(path, "the header does not end and names no data file");
-  return name;
+  if (!name.empty()) return data_files(name, header.list, path);
+  if (!header.body) fail(path, "the header does not end and names no data file");
+  return {};
 }
 
-std::shared_ptr<std::byte[]> decoded(const Header& header, std::span<const std::byte> body, std::size_t size, const fs::path& path) {
-  auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
+// `from`: where the bytes stand.
+void decode(const Header& header, std::span<const std::byte> body, std::span<std::byte> voxels, const fs::path& from,
+            const fs::path& path) {
   const std::string encoding = lower_case(header.get("encoding"));
   if (encoding == "raw") {
-    if (body.size() < size) {
-      fail(path, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(size),
+    if (body.size() < voxels.size()) {
+      fail(from, "it holds " + std::to_string(body.size()) + " bytes of voxels but needs " + std::to_string(voxels.size()),
            "the file was cut short; copy it again from its source");
     }
-    std::memcpy(voxels.get(), body.data(), size);
+    std::memcpy(voxels.data(), body.data(), voxels.size());
   } else if (encoding == "gzip" || encoding == "gz") {
-    inflate_into(body, voxels.get(), size, path);
+    inflate_into(body, voxels.data(), voxels.size(), from);
   } else {
     fail(path, "the encoding '" + encoding + "' is not supported", "save it with gzip or raw encoding");
   }
-  return voxels;
 }
 
 }  // namespace
@@ -235,11 +281,18 @@ RawVolume read_nrrd(const fs::path& path) {
   read_shape(header, raw, path);
   read_place(header, raw.frame, path);
 
-  const std::string data_file = data_file_of(header, path);
-  const std::vector<std::byte> apart = data_file.empty() ? std::vector<std::byte>() : read_file(path.parent_path() / data_file);
-  const std::span<const std::byte> body = data_file.empty() ? std::span(bytes).subspan(*header.body) : std::span(apart);
+  const auto files = data_files_of(header, path);
   const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
-  const auto voxels = decoded(header, body, size, path);
+  auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
+  const std::span<std::byte> all(voxels.get(), size);
+  if (files.empty()) {
+    decode(header, std::span(bytes).subspan(*header.body), all, path, path);
+  } else {
+    if (size % files.size() != 0)
+      fail(path, std::to_string(size) + " bytes of voxels cannot lie in " + std::to_string(files.size()) + " files of the same size");
+    const std::size_t each = size / files.size();
+    for (std::size_t i = 0; i < files.size(); ++i) decode(header, read_file(files[i]), all.subspan(i * each, each), files[i], path);
+  }
   const bool big = lower_case(header.get("endian")) == "big";
   if (scalar > 1 && big != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < size; i += scalar) std::reverse(voxels.get() + i, voxels.get() + i + scalar);

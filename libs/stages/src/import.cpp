@@ -7,7 +7,7 @@ namespace osteo {
 StageInfo ImportStage::info() {
   return {
       .name = "import",
-      .version = 2,
+      .version = 3,
       .synopsis = "a CT from DICOM, NRRD, NIfTI, MetaImage or VTI as one volume in HU",
       .description =
           "Takes a folder of DICOM files, a DICOMDIR, a zip, or one volume file, applies the HU scale and places each voxel in LPS mm, "
@@ -33,7 +33,7 @@ std::vector<Data> ImportStage::run(const Params& params, std::span<const Data> i
 StageInfo ImportBoneStage::info() {
   return {
       .name = "import-bone",
-      .version = 1,
+      .version = 2,
       .synopsis = "DICOM straight to sparse bone, without the volume in memory",
       .description =
           "Reads slices a few at a time, places each by its own position and samples isotropic voxels between them in one pass: a tilted "

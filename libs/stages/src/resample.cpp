@@ -6,7 +6,7 @@ namespace osteo {
 
 StageInfo ResampleStage::info() {
   return {.name = "resample",
-          .version = 4,
+          .version = 5,
           .synopsis = "CT and bone mask to isotropic sparse bone density (OpenVDB)",
           .description =
               "Finds the bone boundary between the voxels of the CT and gives each output voxel the share of it that is bone. "

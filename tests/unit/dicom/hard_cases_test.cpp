@@ -9,6 +9,7 @@
 #include "osteo/dicom/import.h"
 #include "osteo/dicom/objects.h"
 #include "osteo/dicom/volume.h"
+#include "osteo/io/volume_io.h"
 #include "reference.h"
 
 namespace osteo {
@@ -592,6 +593,374 @@ TEST(HardCase, C24_WithoutPreambleAndMeta) {
   } catch (const Error& e) {
     EXPECT_NE(std::string(e.what()).find("no_meta.dcm"), std::string::npos);
   }
+}
+
+// Each pixel stored anew as word(HU), with the tags that say how.
+void store_as(Series& s, const std::function<Uint16(int hu, std::size_t at)>& word, int bits_stored, int high_bit, bool is_signed,
+              int intercept) {
+  s.edit_all([&](DcmDataset& d, int) {
+    const Uint16* read = nullptr;
+    unsigned long count = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+    Float64 offset = 0;
+    d.findAndGetFloat64(DCM_RescaleIntercept, offset);
+    Uint16 was_signed = 0;
+    d.findAndGetUint16(DCM_PixelRepresentation, was_signed);
+    std::vector<Uint16> pixels(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const int stored = was_signed != 0 ? static_cast<std::int16_t>(read[i]) : static_cast<int>(read[i]);
+      pixels[i] = word(std::max(-1024, stored + static_cast<int>(offset)), i);
+    }
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+    d.putAndInsertUint16(DCM_PixelRepresentation, is_signed ? 1 : 0);
+    d.putAndInsertUint16(DCM_BitsStored, static_cast<Uint16>(bits_stored));
+    d.putAndInsertUint16(DCM_HighBit, static_cast<Uint16>(high_bit));
+    d.findAndDeleteElement(DCM_PixelPaddingValue);
+    put(d, DCM_RescaleIntercept, std::to_string(intercept));
+    put(d, DCM_RescaleSlope, "1");
+  });
+}
+
+void expect_same_voxels(const Image& a, const Image& b) {
+  ASSERT_EQ(a.frame.voxel_count(), b.frame.voxel_count());
+  std::size_t other = 0;
+  for (std::size_t i = 0; i < a.frame.voxel_count(); ++i) other += a.voxels[i] != b.voxels[i] ? 1 : 0;
+  EXPECT_EQ(other, 0u);
+}
+
+TEST(HardCase, C25_SignedPixelsWithoutTheirSignExtended) {
+  const auto low = [](int hu) { return std::min(hu, 2047); };
+  Series plain("c25-plain", slices(0, 12)), bare("c25", slices(0, 12)), padded("c25-padded", slices(0, 12));
+  store_as(
+      plain, [&](int hu, std::size_t) { return static_cast<Uint16>(low(hu)); }, 12, 11, true, 0);
+  store_as(
+      bare, [&](int hu, std::size_t) { return static_cast<Uint16>(low(hu) & 0xFFF); }, 12, 11, true, 0);
+  const Imported wanted = load(plain.folder), got = load(bare.folder);
+  EXPECT_FALSE(wanted.verdict.has(code::sign_not_extended));
+  EXPECT_TRUE(got.verdict.has(code::sign_not_extended));
+  EXPECT_LT(got.verdict.values.hu_min, -900);
+  EXPECT_TRUE(got.verdict.values.plausible);
+  expect_same_voxels(wanted.image, got.image);
+  // Its padding is given in the same way, and as a number that 12 bits do not hold.
+  for (const int padding : {-2000, -3024}) {
+    store_as(
+        padded,
+        [&](int hu, std::size_t i) { return static_cast<Uint16>(i < 5000 ? (padding == -2000 ? padding & 0xFFF : padding) : low(hu)); }, 12,
+        11, true, 0);
+    padded.edit_all([&](DcmDataset& d, int) {
+      d.putAndInsertSint16(DcmTag(DCM_PixelPaddingValue, EVR_SS), static_cast<Sint16>(padding == -2000 ? padding & 0xFFF : padding));
+    });
+    const Imported p = load(padded.folder);
+    EXPECT_TRUE(p.verdict.has(code::padding_tag)) << padding;
+    EXPECT_EQ(p.verdict.values.padding_hu, padding);
+    EXPECT_EQ(p.image.voxels[100], -1024);
+    EXPECT_EQ(p.image.voxels[5001], got.image.voxels[5001]);
+  }
+  // No tag names it: negative numbers of more than 12 bits are still that, and no bone of 1072 HU.
+  padded.edit_all([](DcmDataset& d, int) { d.findAndDeleteElement(DCM_PixelPaddingValue); });
+  const Imported untold = load(padded.folder);
+  EXPECT_TRUE(untold.verdict.has(code::bits_stored_wrong));
+  EXPECT_EQ(untold.image.voxels[100], -1024);
+}
+
+TEST(HardCase, C26_OtherBitsAroundThoseOfThePixel) {
+  Series plain("c26-plain", slices(0, 12)), above("c26-above", slices(0, 12)), left("c26-left", slices(0, 12)),
+      wrong("c26-wrong", slices(0, 12)), metal("c26-metal", slices(0, 12));
+  const auto word = [](int hu) { return std::min(hu + 1024, 4095); };
+  const auto columns = static_cast<std::size_t>(load(plain.folder).image.frame.dims[0]);
+  store_as(
+      plain, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu)); }, 12, 11, false, -1024);
+  const Imported wanted = load(plain.folder);
+  // Garbage above HighBit.
+  store_as(
+      above, [&](int hu, std::size_t i) { return static_cast<Uint16>(word(hu) | ((i * 2654435761U >> 7 & 15U) << 12)); }, 12, 11, false,
+      -1024);
+  const Imported cleared = load(above.folder);
+  EXPECT_TRUE(cleared.verdict.has(code::bits_foreign));
+  expect_same_voxels(wanted.image, cleared.image);
+  // The pixel in the upper bits of its word.
+  store_as(
+      left, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu) << 4); }, 12, 15, false, -1024);
+  expect_same_voxels(wanted.image, load(left.folder).image);
+  // A HighBit that is wrong.
+  store_as(
+      wrong, [&](int hu, std::size_t) { return static_cast<Uint16>(word(hu)); }, 12, 15, false, -1024);
+  const Imported guessed = load(wrong.folder);
+  EXPECT_TRUE(guessed.verdict.has(code::high_bit_wrong));
+  expect_same_voxels(wanted.image, guessed.image);
+  // A BitsStored that metal exceeds, with edges as blurred as a scanner's: 5600 and not 1504.
+  store_as(
+      metal, [&](int hu, std::size_t i) { return static_cast<Uint16>(std::max(word(hu), 5600 - 200 * std::abs(int(i % columns) - 20))); },
+      12, 11, false, -1024);
+  const Imported kept = load(metal.folder);
+  EXPECT_TRUE(kept.verdict.has(code::bits_stored_wrong));
+  EXPECT_EQ(kept.image.voxels[20], 4576);
+}
+
+std::string asked(const fs::path& folder, const std::string& series = {}) {
+  ImportParams params;
+  params.series = series;
+  try {
+    return "taken " + std::to_string(load(folder, params).verdict.slices.size());
+  } catch (const Error& e) {
+    return std::to_string(static_cast<int>(e.code())) + " " + e.what() + " " + e.advice();
+  }
+}
+
+void of_another(DcmDataset& d, const DcmTagKey& tag, const char* value) {
+  put(d, tag, value);
+  OFString uid;
+  d.findAndGetOFString(DCM_SOPInstanceUID, uid);
+  put(d, DCM_SOPInstanceUID, std::string(uid.c_str()) + ".7");
+}
+
+// Two patients, studies or frames of reference, each under its own series UID or under one: never one of them without a word.
+TEST(HardCase, C27_ScansThatDoNotBelongTogether) {
+  for (const bool one_series : {false, true}) {
+    for (const auto& [tag, value, said, scans] :
+         {std::tuple{DCM_PatientID, "SOMEBODY ELSE", "2 patients", std::pair{"A1a", "B1a"}},
+          std::tuple{DCM_StudyInstanceUID, "1.2.3.99", "2 studies", std::pair{"A1a", "A2a"}},
+          std::tuple{DCM_FrameOfReferenceUID, "1.2.3.98", "different frames of reference", std::pair{"A1a", "A1b"}}}) {
+      SCOPED_TRACE(std::string(said) + (one_series ? " in one series" : ""));
+      Series s("c27", slices(0, 32));
+      s.edit_all([&](DcmDataset& d, int i) {
+        if (i < 20) return;
+        of_another(d, tag, value);
+        if (!one_series) put(d, DCM_SeriesInstanceUID, "1.2.3.97");
+      });
+      const std::string no_choice = asked(s.folder);
+      EXPECT_EQ(no_choice.substr(0, 2), "4 ") << no_choice;
+      EXPECT_NE(no_choice.find(said), std::string::npos) << no_choice;
+      EXPECT_EQ(no_choice.find("SOMEBODY"), std::string::npos) << no_choice;
+      EXPECT_EQ(asked(s.folder, scans.first), "taken 20");
+      EXPECT_EQ(asked(s.folder, scans.second), "taken 12");
+      const DicomScan scan = scan_dicom(s.folder);
+      EXPECT_EQ(scan.series.size(), 2u);
+      EXPECT_EQ(asked(s.folder, std::string(scans.second) + ":" + std::to_string(scan.series[1].number)), "taken 12");
+      EXPECT_EQ(asked(s.folder, std::to_string(scan.series[1].number)).substr(0, 2), "2 ");
+      ImportParams first;
+      first.series = scans.first;
+      const Verdict v = load(s.folder, first).verdict;
+      EXPECT_EQ(v.has(code::several_scans), one_series);
+      EXPECT_EQ(std::count_if(v.set_aside.begin(), v.set_aside.end(), [](const auto& f) { return f.code == code::several_scans; }),
+                one_series ? 12 : 0);
+    }
+  }
+  // One slice of somebody else makes no scan: it is left out, by name.
+  Series stray("c27-stray", slices(0, 20));
+  stray.edit("010", [](DcmDataset& d) { of_another(d, DCM_PatientID, "SOMEBODY ELSE"); });
+  const Verdict v = load(stray.folder).verdict;
+  EXPECT_TRUE(v.has(code::several_scans));
+  EXPECT_TRUE(v.has(code::slices_missing));
+  EXPECT_EQ(v.slices.size(), 19u);
+}
+
+// What only looks like several scans: a name spelled differently, a frame of reference for each slice, or none in some.
+TEST(HardCase, C27_OneScanThatLooksLikeSeveral) {
+  Series spelled("c27-spelled", slices(0, 20));
+  spelled.edit_all([](DcmDataset& d, int i) { put(d, DCM_PatientName, i % 2 == 0 ? "Doe^Jane" : "DOE^JANE^^"); });
+  EXPECT_EQ(asked(spelled.folder), "taken 20");
+  Series bare("c27-bare", slices(0, 20));
+  bare.edit_all([](DcmDataset& d, int i) {
+    if (i % 3 == 0) d.findAndDeleteElement(DCM_FrameOfReferenceUID);
+  });
+  EXPECT_EQ(load(bare.folder).verdict.status(), "good");
+  Series careless("c27-careless", slices(0, 20));
+  careless.edit_all([](DcmDataset& d, int i) { put(d, DCM_FrameOfReferenceUID, "1.2.3." + std::to_string(i)); });
+  const Imported r = load(careless.folder);
+  EXPECT_TRUE(r.verdict.has(code::frame_of_reference_wrong));
+  EXPECT_EQ(r.verdict.slices.size(), 20u);
+}
+
+// Unsigned pixels that lack their intercept: everything 1024 HU too high, bone from fat on. Refused, with the offset that mends it.
+TEST(HardCase, C28_WithoutTheOffset) {
+  for (const bool thorough : {true, false}) {
+    PhantomParams p;
+    p.spacing_mm = 3;
+    const fs::path folder = test::scratch("c28") / "series";
+    save_dicom_series(make_phantom(p).ct, folder);
+    const Imported wanted = load(folder);
+    Series s("c28-shifted", test::files_in(folder));
+    s.edit_all([&](DcmDataset& d, int) {
+      const Uint16* read = nullptr;
+      unsigned long count = 0;
+      ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &count).good());
+      std::vector<Uint16> pixels(read, read + count);
+      for (auto& v : pixels) v = static_cast<Uint16>(static_cast<std::int16_t>(v) + 1024);
+      ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), count).good());
+      d.putAndInsertUint16(DCM_PixelRepresentation, 0);
+      d.findAndDeleteElement(DCM_PixelPaddingValue);
+      // The one leaves the tag out, the other says 0.
+      thorough ? put(d, DCM_RescaleIntercept, "0") : static_cast<void>(d.findAndDeleteElement(DCM_RescaleIntercept));
+    });
+    const Verdict v = refusal(s.folder, code::hu_shifted, "-1024 HU added to each would put them right");
+    EXPECT_TRUE(v.has(code::bone_implausible));
+    ImportParams params;
+    params.hu_offset = -1024;
+    const Imported mended = load(s.folder, params);
+    EXPECT_TRUE(mended.verdict.has(code::hu_offset));
+    EXPECT_TRUE(mended.verdict.values.plausible);
+    EXPECT_FALSE(mended.verdict.has(code::bone_implausible));
+    expect_same_voxels(wanted.image, mended.image);
+    // As a volume file alike.
+    ImportParams any;
+    any.any_modality = true;
+    const fs::path file = test::scratch("c28-file") / "ct.nrrd";
+    save_image(load(s.folder, any).image, file);
+    refusal(file, code::hu_shifted, "-1024 HU");
+    expect_same_voxels(wanted.image, load(file, params).image);
+  }
+}
+
+TEST(HardCase, C29_ProjectionsAndSlabs) {
+  const auto made = [](const char* name, const std::function<void(DcmDataset&)>& change) {
+    auto s = std::make_unique<Series>(name, slices(0, 20));
+    s->edit_all([&](DcmDataset& d, int) { change(d); });
+    return s;
+  };
+  const auto by_type = made("c29-type", [](DcmDataset& d) {
+    put(d, DCM_ImageType, "DERIVED\\SECONDARY\\MIP");
+    put(d, DCM_SliceThickness, "10");
+  });
+  refusal(by_type->folder, code::projection, "slab of 10 mm");
+  ImportParams any;
+  any.any_modality = true;
+  EXPECT_TRUE(load(by_type->folder, any).verdict.has(code::projection));
+  refusal(made("c29-name", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "AX Thin MIP_10mm"); })->folder, code::projection);
+  EXPECT_FALSE(load(made("c29-other", [](DcmDataset& d) { put(d, DCM_SeriesDescription, "Mipham temporal"); })->folder)
+                   .verdict.has(code::projection));
+  const auto by_far = made("c29-slab", [](DcmDataset& d) { put(d, DCM_SliceThickness, "10"); });
+  const Verdict slab = load(by_far->folder).verdict;
+  EXPECT_TRUE(slab.has(code::slices_overlap));
+  EXPECT_EQ(slab.status(), "repaired");
+  const auto half = made("c29-half", [](DcmDataset& d) { put(d, DCM_SliceThickness, "2"); });
+  const Verdict overlap = load(half->folder).verdict;
+  EXPECT_TRUE(overlap.has(code::slices_overlap));
+  EXPECT_EQ(overlap.status(), "good");
+}
+
+TEST(HardCase, C30_ValuesThatAreNoHounsfieldUnits) {
+  for (const char* type : {"Z_EFF", "ED", "MGML", "PCT"}) {
+    Series s("c30", slices(0, 12));
+    s.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, type); });
+    refusal(s.folder, code::rescale_type, type);
+  }
+  Series modified("c30-modified", slices(0, 12)), unspecified("c30-us", slices(0, 12));
+  modified.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, "HU_MOD"); });
+  EXPECT_TRUE(load(modified.folder).verdict.has(code::rescale_type));
+  unspecified.edit_all([&](DcmDataset& d, int) { put(d, DCM_RescaleType, "US"); });
+  EXPECT_FALSE(load(unspecified.folder).verdict.has(code::rescale_type));
+}
+
+// Dark streaks beside metal are measured; a value that marks what was not measured is not.
+TEST(HardCase, C31_BelowAirIsKept) {
+  Series s("c31", slices(0, 12));
+  store_as(
+      s,
+      [](int hu, std::size_t i) {
+        if (i < 2000) return static_cast<Uint16>(-2000);
+        return static_cast<Uint16>(i > 20000 && i < 20100 ? -1100 - static_cast<int>(i % 97) * 7 : hu);
+      },
+      16, 15, true, 0);
+  const Imported r = load(s.folder);
+  EXPECT_EQ(r.image.voxels[0], -1024);
+  EXPECT_TRUE(r.verdict.has(code::padding_found));
+  EXPECT_TRUE(r.verdict.has(code::below_air));
+  for (int i = 20001; i < 20100; ++i) EXPECT_EQ(r.image.voxels[static_cast<std::size_t>(i)], -1100 - i % 97 * 7);
+}
+
+// Words that are true.
+TEST(HardCase, C32_OneShiftedSliceIsNoTilt) {
+  Series s("c32", slices(0, 20));
+  const auto shift = [](DcmDataset& d, double by) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, p.y + by, p.z}));
+  };
+  s.edit("019", [&](DcmDataset& d) { shift(d, 9); });
+  const Verdict v = load(s.folder).verdict;
+  EXPECT_FALSE(v.has(code::tilted));
+  EXPECT_EQ(v.tilt_deg, 0);
+  const auto it = std::find_if(v.findings.begin(), v.findings.end(), [](const auto& f) { return f.code == code::shifted_sideways; });
+  ASSERT_NE(it, v.findings.end());
+  EXPECT_NE(it->message.find("one slice ('019') is shifted sideways by 9 mm"), std::string::npos) << it->message;
+  // The table moved half-way: a step, and no tilt either.
+  Series half("c32-half", slices(0, 20));
+  half.edit_all([&](DcmDataset& d, int i) { shift(d, i < 10 ? 0 : 6); });
+  const Verdict step = load(half.folder).verdict;
+  EXPECT_FALSE(step.has(code::tilted));
+  EXPECT_TRUE(step.has(code::shifted_sideways));
+  // Positions rounded to tenths of a millimetre on a tilted series are still a tilt, and no shift.
+  Series rounded("c32-rounded", slices(0, 20));
+  rounded.edit_all([&](DcmDataset& d, int) {
+    const Vec3 p = test::position_of(d);
+    put(d, DCM_ImagePositionPatient, test::text({p.x, std::round((p.y + 0.13 * p.z) * 10) / 10, p.z}));
+  });
+  const Verdict tilted = load(rounded.folder).verdict;
+  EXPECT_TRUE(tilted.has(code::tilted));
+  EXPECT_FALSE(tilted.has(code::shifted_sideways));
+  EXPECT_NEAR(tilted.tilt_deg, 7.4, 0.3);
+}
+
+TEST(HardCase, C32_DuplicatesLeaveTheSeriesComplete) {
+  Series s("c32-twice", slices(0, 20));
+  fs::copy_file(fs::canonical(s.folder / "010"), s.folder / "copy of 010");
+  s.edit(
+      "011", [](DcmDataset& d) { put(d, DCM_SOPInstanceUID, "1.2.3.4.5"); }, "011 again");
+  const DicomScan scan = scan_dicom(s.folder);
+  ASSERT_EQ(scan.series.size(), 1u);
+  EXPECT_TRUE(scan.series[0].usable);
+  EXPECT_NE(scan.series[0].why.find(", complete"), std::string::npos) << scan.series[0].why;
+}
+
+TEST(HardCase, C32_ACroppedThoraxIsOnTheScale) {
+  // Lungs of -850 HU with airways, muscle and bone: no air around the body, as in a scan cut to the heart.
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 15);
+  Frame f;
+  f.dims = {96, 96, 40};
+  f.spacing_mm = {2, 2, 2};
+  const auto voxels = make_voxels<std::int16_t>(f.voxel_count());
+  const auto make = [&](double scale) {
+    for (std::size_t i = 0; i < f.voxel_count(); ++i) {
+      const std::size_t x = i % 96;
+      const double hu = x < 40 ? (i % 50 == 0 ? -990 : -850) : x < 85 ? 50 : x < 88 ? 700 : -100;
+      voxels[i] = static_cast<std::int16_t>(std::lround(scale * hu + noise(random)));
+    }
+    const fs::path file = test::scratch("c32-thorax") / "ct.nrrd";
+    save_image({f, voxels}, file);
+    return load(file).verdict;
+  };
+  const Verdict v = make(1);
+  EXPECT_FALSE(v.has(code::hu_scaled));
+  EXPECT_TRUE(v.values.plausible);
+  EXPECT_EQ(v.status(), "good");
+  // The same on another scale is found out.
+  EXPECT_FALSE(make(0.85).values.plausible);
+}
+
+TEST(HardCase, C32_PicturesOfOneFileAreToldApart) {
+  const auto& all = straight_series();
+  Series s("c32-frames", {all[0]});
+  s.edit("000", [&](DcmDataset& d) {
+    const Uint16* read = nullptr;
+    unsigned long n = 0;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, read, &n).good());
+    std::vector<Uint16> pixels;
+    OFString spacing, orientation;
+    d.findAndGetOFStringArray(DCM_PixelSpacing, spacing);
+    for (int i = 0; i < 11; ++i) {
+      pixels.insert(pixels.end(), read, read + n);
+      DcmItem *frame = nullptr, *group = nullptr;
+      ASSERT_TRUE(d.findOrCreateSequenceItem(DCM_PerFrameFunctionalGroupsSequence, frame, i).good());
+      ASSERT_TRUE(frame->findOrCreateSequenceItem(DCM_PlanePositionSequence, group, 0).good());
+      put(*group, DCM_ImagePositionPatient, test::text({0, 0, i < 6 ? double(i) : i + 6.0}));
+    }
+    d.findAndDeleteElement(DCM_ImagePositionPatient);
+    put(d, DCM_NumberOfFrames, "11");
+    put(d, DCM_SOPClassUID, UID_EnhancedCTImageStorage);
+    ASSERT_TRUE(d.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+  });
+  refusal(s.folder, code::hole_too_wide, "between '000 (picture 6)' and '000 (picture 7)'");
 }
 
 }  // namespace

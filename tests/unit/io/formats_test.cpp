@@ -103,6 +103,45 @@ TEST(Nrrd, RasBigEndianRawIsReadRight) {
   EXPECT_EQ(orientation_code(image.frame), "RAS");
 }
 
+// A header apart from its voxels, which lie in one file a slice, or two slices a file: listed by name, or by a pattern.
+TEST(Nrrd, SeveralDataFilesAreReadInTheirOrder) {
+  const fs::path at = folder() / "several";
+  fs::create_directories(at);
+  const auto file = [&](const std::string& name, int first, int count) {
+    std::string bytes;
+    for (int i = 0; i < count; ++i) bytes += {static_cast<char>(first + i), '\0'};
+    write_file(at / name, bytes);
+  };
+  const auto header = [&](const std::string& rest) {
+    write_file(at / "v.nhdr", "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 4\nspacings: 1 1 2\nendian: little\nencoding: raw\n" + rest);
+    return at / "v.nhdr";
+  };
+  const auto expect_in_order = [&](const fs::path& path) {
+    const Image image = load_image(path);
+    for (int i = 0; i < 24; ++i) EXPECT_EQ(image.voxels[static_cast<std::size_t>(i)], i);
+  };
+  const auto expect_refused = [&](const fs::path& path, const std::string& said) {
+    try {
+      static_cast<void>(load_image(path));
+      ADD_FAILURE() << said;
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find(said), std::string::npos) << e.what();
+    }
+  };
+  for (int k = 0; k < 4; ++k) file("s" + std::to_string(10 - k) + ".raw", 6 * k, 6);
+  expect_in_order(header("data file: LIST\ns10.raw\ns9.raw\ns8.raw\ns7.raw\n"));
+  expect_in_order(header("data file: s%d.raw 10 7 -1\n"));
+  for (int k = 0; k < 2; ++k) file("pair-00" + std::to_string(3 + 2 * k) + ".raw", 12 * k, 12);
+  expect_in_order(header("data file: pair-%03d.raw 3 5 2 3\n"));
+  expect_in_order(header("data file: LIST 3\npair-003.raw\npair-005.raw\n"));
+  expect_refused(header("data file: LIST\ns10.raw\ns9.raw\ns8.raw\n"), "s10.raw");  // eight voxels each are wanted
+  expect_refused(header("data file: LIST\ns10.raw\ns9.raw\ns8.raw\nnone.raw\n"), "none.raw");
+  expect_refused(header("data file: LIST\n"), "empty");
+  expect_refused(header("data file: s%s.raw 1 4 1\n"), "are not like");
+  expect_refused(header("data file: s%d.raw 1 4 0\n"), "are not like");
+  expect_refused(header("byte skip: 4\ndata file: s%d.raw 7 10 1\n"), "byte skip");
+}
+
 TEST(Nrrd, ShearIsRefused) {
   const auto path = folder() / "shear.nrrd";
   std::ofstream(path, std::ios::binary) << "NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"

@@ -18,6 +18,7 @@ struct DicomFrame {
   Vec3 along_row, along_column;
   double column_spacing_mm = 0, row_spacing_mm = 0;  ///< between columns (along a row), between rows; 0 when not stated
   double slope = 1, intercept = 0;
+  std::string rescale_type;  ///< what the values are: "HU", or empty where the file does not say
 };
 
 struct DicomHeader {
@@ -29,7 +30,9 @@ struct DicomHeader {
 
   // Of use for grouping only; never written anywhere.
   std::string series_uid, sop_uid, study_uid, frame_of_reference_uid;
-  std::vector<std::string> identifying;  ///< values that name the patient, the people or the place, lower case
+  std::string patient;                        ///< name, number and birth date as one text, the same for all files of a person
+  std::string study_date, study_description;  ///< shown on request only
+  std::vector<std::string> identifying;       ///< values that name the patient, the people or the place, lower case
 
   std::string sop_class, modality, image_type, description, kernel, manufacturer, transfer_syntax;
   int series_number = 0, acquisition = 0, instance = 0;
@@ -39,8 +42,9 @@ struct DicomHeader {
 
   int columns = 0, rows = 0, samples = 1;
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
+  bool projection = false;                   ///< its pictures show the most (or least) of a slab, or a rendering, not a slice
   bool is_signed = false, inverted = false;  ///< inverted: MONOCHROME1
-  bool overlay_in_pixels = false;            ///< bits above high_bit hold an overlay
+  bool overlay_in_pixels = false;            ///< bits around those of the pixel hold an overlay
   std::optional<int> padding, padding_limit;
   bool compressed = false, big_endian = false;
   std::uint64_t pixel_offset = 0;  ///< first byte of uncompressed pixels

@@ -15,11 +15,13 @@ struct ImportParams {
   double max_gap_mm = 8;
   double max_hole_mm = 3;
   bool any_modality = false;
+  double hu_offset = 0;
   std::string axes;
 };
 
 [[nodiscard]] inline PlaceOptions place_options(const ImportParams& p) {
-  return {.max_gap_mm = p.max_gap_mm, .max_hole_mm = p.max_hole_mm, .stack = p.stack, .any_modality = p.any_modality};
+  return {
+      .max_gap_mm = p.max_gap_mm, .max_hole_mm = p.max_hole_mm, .stack = p.stack, .any_modality = p.any_modality, .hu_offset = p.hu_offset};
 }
 
 struct Imported {
@@ -27,7 +29,7 @@ struct Imported {
   Verdict verdict;
 };
 
-/// A DICOM folder, DICOMDIR, file or archive, or a volume file. Values below -1024 HU become -1024.
+/// A DICOM folder, DICOMDIR, file or archive, or a volume file.
 /// Throws Refused (with the verdict) for a series that cannot be placed rightly; else errors as of scan_dicom, choose_series and
 /// load_image.
 [[nodiscard]] Imported import_ct(const std::filesystem::path& source, const ImportParams& params, const Context& context = {});

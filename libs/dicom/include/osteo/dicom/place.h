@@ -9,10 +9,11 @@
 namespace osteo {
 
 struct PlaceOptions {
-  double max_gap_mm = 8;   ///< widest usual distance between slices that is interpolated
-  double max_hole_mm = 3;  ///< widest distance that is interpolated where slices are missing
-  int stack = 0;           ///< which stack of a series that holds several, from 1; 0 takes the best
-  bool any_modality = false;
+  double max_gap_mm = 8;      ///< widest usual distance between slices that is interpolated
+  double max_hole_mm = 3;     ///< widest distance that is interpolated where slices are missing
+  int stack = 0;              ///< which stack of a series that holds several, from 1; 0 takes the best
+  bool any_modality = false;  ///< also what is no CT, no slice, or not in HU
+  double hu_offset = 0;       ///< added to all values, for series that leave out their rescale intercept
 };
 
 /// One slice of the stack, in order along the normal.

@@ -28,12 +28,17 @@ inline constexpr std::string_view not_ct = "NOT_CT", not_a_volume = "NOT_A_VOLUM
                                   gap_too_wide = "GAP_TOO_WIDE", slices_missing = "SLICES_MISSING", hole_too_wide = "HOLE_TOO_WIDE",
                                   gaps_uneven = "GAPS_UNEVEN", tilted = "TILTED", shifted_sideways = "SHIFTED_SIDEWAYS",
                                   several_stacks = "SEVERAL_STACKS", few_slices = "FEW_SLICES", tilt_tag_wrong = "TILT_TAG_WRONG",
-                                  spacing_tag_wrong = "SPACING_TAG_WRONG";
+                                  spacing_tag_wrong = "SPACING_TAG_WRONG", several_scans = "SEVERAL_SCANS",
+                                  frame_of_reference_wrong = "FRAME_OF_REFERENCE_WRONG", projection = "PROJECTION",
+                                  slices_overlap = "SLICES_OVERLAP";
 // The values.
 inline constexpr std::string_view padding_tag = "PADDING_TAG", padding_found = "PADDING_FOUND", padding_tag_wrong = "PADDING_TAG_WRONG",
                                   monochrome1 = "MONOCHROME1", saturated = "SATURATED", metal = "METAL", values_rounded = "VALUES_ROUNDED",
                                   values_out_of_range = "VALUES_OUT_OF_RANGE", hu_wrong_sign = "HU_WRONG_SIGN", hu_shifted = "HU_SHIFTED",
-                                  hu_scaled = "HU_SCALED", not_hu = "NOT_HU", no_air = "NO_AIR", lossy = "LOSSY";
+                                  hu_scaled = "HU_SCALED", not_hu = "NOT_HU", no_air = "NO_AIR", lossy = "LOSSY",
+                                  sign_not_extended = "SIGN_NOT_EXTENDED", bits_foreign = "BITS_FOREIGN",
+                                  bits_stored_wrong = "BITS_STORED_WRONG", high_bit_wrong = "HIGH_BIT_WRONG", rescale_type = "RESCALE_TYPE",
+                                  hu_offset = "HU_OFFSET", below_air = "BELOW_AIR", bone_implausible = "BONE_IMPLAUSIBLE";
 }  // namespace code
 
 enum class Severity { info, warning, error };
@@ -82,6 +87,7 @@ struct Verdict {
   std::string source = "DICOM";
   int series = 0, stack = 1, stacks = 1;
   std::string modality, kernel, why_chosen;
+  std::string scan_hash;  ///< of its study and frame of reference: the same for all series of one scan; empty where they are not known
   int columns = 0, rows = 0;
   double pixel_mm[2] = {0, 0};
   double thickness_mm = 0;
@@ -108,7 +114,8 @@ struct Verdict {
 
 /// What a person wants to know of a verdict that was written before.
 struct VerdictSummary {
-  std::string status;  ///< "good", "repaired", "refused"
+  std::string status;     ///< "good", "repaired", "refused"
+  std::string scan_hash;  ///< as in Verdict
   std::vector<Finding> findings;
 };
 /// Error(corrupt) when the text is no verdict.

@@ -31,7 +31,8 @@ struct ResampledBone {
 /// A voxel's density is the share of it inside, from the signed HU distance to the boundary over its gradient; coarser
 /// voxels than the CT's are averaged from sub-voxels, so nothing aliases.
 /// With a box, the boundary's offset is that of the whole bone at align_mm, so that both meet where they touch.
-/// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels (the highest such).
+/// The value that fits best is the one at which `HU >= lower` differs from the mask in the fewest voxels: the highest such, or the middle
+/// where they are more than 20 HU apart (a warning says so).
 /// `ct` and `mask` must lie at the same place (Error usage). O(output voxels near bone). Same bytes for any thread count.
 [[nodiscard]] ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleParams& params, const Context& context = {});
 

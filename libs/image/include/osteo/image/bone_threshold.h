@@ -1,6 +1,7 @@
 // Which Hounsfield threshold suits the bone of this scan, and how sure that is.
 #pragma once
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "osteo/base/param.h"
@@ -30,6 +31,7 @@ struct BoneGuide {
   double dense_bone_hu = 0;            ///< what bone reaches where it is thicker than the blur: upper quarter of its inside
   double confidence = 0;               ///< 0 to 1: how far apart bone and tissue lie against the noise, times how sharp the edges are
   std::array<PresetGuide, 3> presets;  ///< cortical, cellular, thin
+  std::string doubt;                   ///< why the thresholds cannot be right (more bone than a body has); then confidence is 0
 };
 
 /// Half the way from soft tissue to dense bone puts the edge of thick bone where it is, whatever the blur (cortical). Walls thinner

@@ -1,0 +1,222 @@
+// Segmentations: identities that DICOM does not allow, and every way pixels are packed.
+#include <dcmtk/dcmdata/dcpixel.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
+#include <dcmtk/dcmdata/dcrleerg.h>
+#include <dcmtk/dcmdata/dcrlerp.h>
+#include <dcmtk/dcmjpls/djencode.h>
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmImageReader.h>
+#include <gdcmImageWriter.h>
+
+#include "edit.h"
+#include "osteo/base/error.h"
+#include "osteo/dicom/objects.h"
+#include "osteo/dicom/volume.h"
+
+namespace osteo {
+namespace {
+
+using test::put;
+using test::scratch;
+using test::Series;
+using test::straight_series;
+
+std::vector<fs::path> slices(int begin, int end) {
+  const auto& all = straight_series();
+  return {all.begin() + begin, all.begin() + end};
+}
+
+Labels bone_of(const Image& ct) {
+  const auto mask = make_voxels<std::uint8_t>(ct.frame.voxel_count());
+  for (std::size_t i = 0; i < ct.frame.voxel_count(); ++i) mask[i] = ct.voxels[i] > 300 ? 1 : 0;
+  return {{ct.frame, mask}, {}};
+}
+
+void expect_same_mask(const Labels& a, const Labels& b) {
+  // Slices without bone are not in the file.
+  std::size_t other = 0, bone = 0;
+  for (int k = 0; k < b.frame.dims[2]; ++k) {
+    for (int j = 0; j < b.frame.dims[1]; ++j) {
+      for (int i = 0; i < b.frame.dims[0]; ++i) {
+        const Vec3 at = a.frame.index_from_world(b.frame.world_from_index({double(i), double(j), double(k)}));
+        other += a.at(int(std::lround(at.x)), int(std::lround(at.y)), int(std::lround(at.z))) != b.at(i, j, k) ? 1 : 0;
+        bone += b.at(i, j, k);
+      }
+    }
+  }
+  EXPECT_EQ(other, 0u);
+  EXPECT_EQ(bone, static_cast<std::size_t>(std::count(a.span().begin(), a.span().end(), 1)));
+}
+
+std::string text_of(const fs::path& file, const DcmTagKey& tag) {
+  DcmFileFormat f;
+  EXPECT_TRUE(f.loadFile(file.c_str()).good());
+  OFString value;
+  f.getDataset()->findAndGetOFString(tag, value);
+  return value.c_str();
+}
+
+// Careless anonymisation leaves hashes where dates and UIDs belong: what is not allowed is not taken over, by name.
+TEST(Objects, TagsOfTheSourceThatDicomDoesNotAllow) {
+  Series s("bad-tags", slices(0, 12));
+  s.edit_all([](DcmDataset& d, int i) {
+    put(d, DCM_StudyDate, "a8f3c9e177");
+    put(d, DCM_StudyTime, "hash77x");
+    put(d, DCM_PatientBirthDate, "REMOVED");
+    put(d, DCM_PatientSex, "unknown sex of a person");
+    put(d, DCM_StudyInstanceUID, "anon-study-77");
+    put(d, DCM_FrameOfReferenceUID, "1.2.FOR.xyz");
+    put(d, DCM_SeriesInstanceUID, "hash-series");
+    put(d, DCM_SOPInstanceUID, "hash-" + std::to_string(i));
+    put(d, DCM_PatientID, "P 77");
+  });
+  const DicomScan scan = scan_dicom(s.folder);
+  ASSERT_EQ(scan.series.size(), 1u);
+  const Image ct = load_dicom_series(scan.series[0]).image;
+  const Labels bone = bone_of(ct);
+  std::string said;
+  Context context;
+  context.on_log([&](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) said += text;
+  });
+  const fs::path out = scratch("bad-tags-out");
+  for (const bool on_source : {false, true}) {
+    SCOPED_TRACE(on_source);
+    said.clear();
+    const fs::path file = out / (on_source ? "source.dcm" : "stack.dcm");
+    const DicomObjectOptions options{&scan.series[0], "Bone"};
+    on_source ? save_segmentation_on_source(bone, file, options, context) : save_segmentation(bone, file, options, context);
+    for (const char* name : {"StudyDate", "StudyTime", "PatientBirthDate", "PatientSex", "StudyInstanceUID", "FrameOfReferenceUID"})
+      EXPECT_NE(said.find(name), std::string::npos) << said;
+    EXPECT_EQ(said.find("a8f3c9e177"), std::string::npos) << "values are not shown";
+    expect_same_mask(bone, load_segmentation(file));
+    EXPECT_EQ(text_of(file, DCM_StudyDate), "");
+    EXPECT_EQ(text_of(file, DCM_PatientID), "P 77");
+    EXPECT_EQ(text_of(file, DCM_StudyInstanceUID).substr(0, 5), "2.25.");
+  }
+  // The same invalid UID, the same valid one: both objects belong to one study.
+  EXPECT_EQ(text_of(out / "stack.dcm", DCM_StudyInstanceUID), text_of(out / "source.dcm", DCM_StudyInstanceUID));
+  TriMesh mesh;
+  mesh.points_mm = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  save_encapsulated_stl(mesh, out / "stl.dcm", {&scan.series[0], "Bone"}, context);
+  EXPECT_EQ(text_of(out / "stl.dcm", DCM_StudyInstanceUID), text_of(out / "stack.dcm", DCM_StudyInstanceUID));
+  EXPECT_EQ(text_of(out / "stl.dcm", DCM_StudyDate), "");
+}
+
+// Bits as bytes of 0 and 255, a fractional segmentation.
+void make_fractional(const fs::path& from, const fs::path& to) {
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(from.c_str()).good());
+  DcmDataset& d = *file.getDataset();
+  Uint16 rows = 0, columns = 0;
+  Sint32 frames = 0;
+  d.findAndGetUint16(DCM_Rows, rows);
+  d.findAndGetUint16(DCM_Columns, columns);
+  d.findAndGetSint32(DCM_NumberOfFrames, frames);
+  const Uint8* bits = nullptr;
+  ASSERT_TRUE(d.findAndGetUint8Array(DCM_PixelData, bits).good());
+  std::vector<Uint8> bytes(static_cast<std::size_t>(rows) * columns * static_cast<std::size_t>(frames));
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = (bits[i / 8] >> (i % 8) & 1) != 0 ? 255 : 0;
+  d.putAndInsertUint16(DCM_BitsAllocated, 8);
+  d.putAndInsertUint16(DCM_BitsStored, 8);
+  d.putAndInsertUint16(DCM_HighBit, 7);
+  put(d, DCM_SegmentationType, "FRACTIONAL");
+  put(d, DCM_SegmentationFractionalType, "OCCUPANCY");
+  d.putAndInsertUint16(DCM_MaximumFractionalValue, 255);
+  ASSERT_TRUE(d.putAndInsertUint8Array(DCM_PixelData, bytes.data(), bytes.size()).good());
+  ASSERT_TRUE(file.saveFile(to.c_str(), EXS_LittleEndianExplicit).good());
+}
+
+// PackBits, literal runs only (PS3.5 G), of one segment.
+std::vector<Uint8> run_length(const std::vector<Uint8>& bytes) {
+  std::vector<Uint8> out(64, 0);
+  out[0] = 1;
+  out[4] = 64;
+  for (std::size_t at = 0; at < bytes.size(); at += 128) {
+    const std::size_t n = std::min<std::size_t>(128, bytes.size() - at);
+    out.push_back(static_cast<Uint8>(n - 1));
+    out.insert(out.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.begin() + static_cast<std::ptrdiff_t>(at + n));
+  }
+  if (out.size() % 2 != 0) out.push_back(0);
+  return out;
+}
+
+TEST(Objects, SegmentationsAreReadHoweverTheyArePacked) {
+  const Series s("packed", slices(0, 8));
+  const Labels bone = bone_of(load_dicom_series(scan_dicom(s.folder).series.at(0)).image);
+  const fs::path out = scratch("packed-out"), plain = out / "plain.dcm", fractional = out / "fractional.dcm";
+  save_segmentation(bone, plain);
+  const auto expect_read = [&](const fs::path& file) {
+    SCOPED_TRACE(file.filename().string());
+    ASSERT_TRUE(is_segmentation(file));
+    expect_same_mask(bone, load_segmentation(file));
+  };
+  expect_read(plain);
+  make_fractional(plain, fractional);
+  expect_read(fractional);
+
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(plain.c_str()).good());
+  ASSERT_TRUE(file.saveFile((out / "deflated.dcm").c_str(), EXS_DeflatedLittleEndianExplicit).good());
+  expect_read(out / "deflated.dcm");
+
+  DcmRLEEncoderRegistration::registerCodecs();
+  ASSERT_TRUE(file.loadFile(fractional.c_str()).good());
+  ASSERT_TRUE(file.getDataset()->chooseRepresentation(EXS_RLELossless, nullptr).good());
+  ASSERT_TRUE(file.saveFile((out / "rle.dcm").c_str(), EXS_RLELossless).good());
+  expect_read(out / "rle.dcm");
+
+  DJLSEncoderRegistration::registerCodecs();
+  ASSERT_TRUE(file.loadFile(fractional.c_str()).good());
+  ASSERT_TRUE(file.getDataset()->chooseRepresentation(EXS_JPEGLSLossless, nullptr).good());
+  ASSERT_TRUE(file.saveFile((out / "jpeg-ls.dcm").c_str(), EXS_JPEGLSLossless).good());
+  expect_read(out / "jpeg-ls.dcm");
+
+  gdcm::ImageReader reader;
+  reader.SetFileName(fractional.c_str());
+  ASSERT_TRUE(reader.Read());
+  gdcm::ImageChangeTransferSyntax change;
+  change.SetTransferSyntax(gdcm::TransferSyntax::JPEG2000Lossless);
+  change.SetInput(reader.GetImage());
+  ASSERT_TRUE(change.Change());
+  gdcm::ImageWriter writer;
+  writer.SetFileName((out / "j2k.dcm").c_str());
+  writer.SetFile(reader.GetFile());
+  writer.SetImage(change.GetOutput());
+  ASSERT_TRUE(writer.Write());
+  expect_read(out / "j2k.dcm");
+
+  // Bits in run lengths: the packed bytes of each frame are what is encoded.
+  ASSERT_TRUE(file.loadFile(plain.c_str()).good());
+  DcmDataset& d = *file.getDataset();
+  const Uint8* bits = nullptr;
+  ASSERT_TRUE(d.findAndGetUint8Array(DCM_PixelData, bits).good());
+  Sint32 frames = 0;
+  d.findAndGetSint32(DCM_NumberOfFrames, frames);
+  const std::size_t area = static_cast<std::size_t>(bone.frame.dims[0]) * static_cast<std::size_t>(bone.frame.dims[1]);
+  auto* const sequence = new DcmPixelSequence(DcmTag(DCM_PixelData, EVR_OB));
+  sequence->insert(new DcmPixelItem(DcmTag(DCM_Item, EVR_OB)));
+  for (std::size_t f = 0; f < static_cast<std::size_t>(frames); ++f) {
+    std::vector<Uint8> packed((area + 7) / 8);
+    for (std::size_t i = 0, at = f * area; i < area; ++i, ++at)
+      packed[i / 8] = static_cast<Uint8>(packed[i / 8] | (bits[at / 8] >> (at % 8) & 1) << (i % 8));
+    const std::vector<Uint8> coded = run_length(packed);
+    auto* const item = new DcmPixelItem(DcmTag(DCM_Item, EVR_OB));
+    item->putUint8Array(coded.data(), static_cast<unsigned long>(coded.size()));
+    sequence->insert(item);
+  }
+  auto* const pixels = new DcmPixelData(DcmTag(DCM_PixelData, EVR_OB));
+  pixels->putOriginalRepresentation(EXS_RLELossless, new DcmRLERepresentationParameter, sequence);
+  d.insert(pixels, OFTrue);
+  ASSERT_TRUE(file.saveFile((out / "bits-rle.dcm").c_str(), EXS_RLELossless).good());
+  expect_read(out / "bits-rle.dcm");
+
+  // Damaged: refused, with the reason.
+  fs::resize_file(out / "j2k.dcm", fs::file_size(out / "j2k.dcm") * 2 / 3);
+  EXPECT_THROW(static_cast<void>(load_segmentation(out / "j2k.dcm")), Error);
+}
+
+}  // namespace
+}  // namespace osteo
