@@ -49,15 +49,15 @@ TEST(Truth, VolumeOfBoneWithinOnePercentOfTheExactLabels) {
 }
 
 // Distance of a surface point to the exact boundary along its normal, by bisection; at most 3 mm is looked for.
-double distance_to_boundary(Vec3 p, Vec3 n) {
-  const bool inside = is_bone(phantom_tissue(p));
+double distance_to_boundary(const HeadAnatomy& truth, Vec3 p, Vec3 n) {
+  const bool inside = is_bone(truth.tissue(p));
   for (double d = 0.05; d <= 3; d += 0.05) {
     for (const double s : {d, -d}) {
-      if (is_bone(phantom_tissue(p + n * s)) == inside) continue;
+      if (is_bone(truth.tissue(p + n * s)) == inside) continue;
       double lo = d - 0.05, hi = d;
       for (int i = 0; i < 20; ++i) {
         const double mid = (lo + hi) / 2;
-        (is_bone(phantom_tissue(p + n * (s > 0 ? mid : -mid))) == inside ? lo : hi) = mid;
+        (is_bone(truth.tissue(p + n * (s > 0 ? mid : -mid))) == inside ? lo : hi) = mid;
       }
       return hi;
     }
@@ -67,12 +67,13 @@ double distance_to_boundary(Vec3 p, Vec3 n) {
 
 TEST(Truth, SurfaceWithinHalfAVoxelOfTheExactBoundary) {
   const auto& mesh = head().nets.mesh;
+  const HeadAnatomy truth;
   double sum = 0;
   std::vector<double> all;
   for (std::size_t v = 0; v < mesh.points_mm.size(); v += 37) {
     const auto& p = mesh.points_mm[v];
     const auto& n = mesh.normals[v];
-    all.push_back(distance_to_boundary({p[0], p[1], p[2]}, {n[0], n[1], n[2]}));
+    all.push_back(distance_to_boundary(truth, {p[0], p[1], p[2]}, {n[0], n[1], n[2]}));
     sum += all.back();
   }
   std::sort(all.begin(), all.end());
