@@ -13,11 +13,12 @@ namespace {
 
 // Bone and what lies around it have their mean near 500, so that one threshold finds unbiased boundaries; cancellous bone, which lies
 // within a cortex, is above it.
-constexpr std::array<double, kTissueCount> kHu{-1000, 40,   960, 960, 960, 1200, 60, 50, 2600,  700,
+constexpr std::array<double, kTissueCount> kHu{-1000, 40,   960, 960, 960, 1200, 60, 50,    2600,  700,
                                                700,   1500, 30,  50,  50,  50,   60, -1000, -1000, -1000};
 constexpr std::array<std::string_view, kTissueCount> kNames{
-    "air",        "soft tissue", "cortical bone", "cellular bone",  "mandible",       "ossicle", "facial nerve", "sigmoid sinus", "left marker", "diploe",
-    "jaw marrow", "tooth",       "labyrinth",     "chorda tympani", "alveolar nerve", "carotid artery", "dura", "air cells",     "ear canal",   "tympanic cavity"};
+    "air",         "soft tissue", "cortical bone", "cellular bone",  "mandible",  "ossicle",        "facial nerve",   "sigmoid sinus",
+    "left marker", "diploe",      "jaw marrow",    "tooth",          "labyrinth", "chorda tympani", "alveolar nerve", "carotid artery",
+    "dura",        "air cells",   "ear canal",     "tympanic cavity"};
 
 // Distances are signed, negative inside, and grow by at most kLipschitz a mm: ellipsoids and sheared bodies are first-order.
 constexpr double kLipschitz = 1.6;
@@ -110,7 +111,8 @@ class Tube {
       Chunk chunk{{1e30, 1e30, 1e30}, {-1e30, -1e30, -1e30}, points_.size() - 1, 0};
       for (int s = 1; s <= kSteps; ++s) {
         const double t = static_cast<double>(s) / kSteps, t2 = t * t, t3 = t2 * t;
-        const double wa = -0.5 * t3 + t2 - 0.5 * t, wb = 1.5 * t3 - 2.5 * t2 + 1, wc = -1.5 * t3 + 2 * t2 + 0.5 * t, wd = 0.5 * t3 - 0.5 * t2;
+        const double wa = -0.5 * t3 + t2 - 0.5 * t, wb = 1.5 * t3 - 2.5 * t2 + 1, wc = -1.5 * t3 + 2 * t2 + 0.5 * t,
+                     wd = 0.5 * t3 - 0.5 * t2;
         points_.push_back({a.at_mm * wa + b.at_mm * wb + c.at_mm * wc + d.at_mm * wd, mix(b.radius_mm, c.radius_mm, t)});
       }
       chunk.last = points_.size() - 1;
@@ -130,7 +132,7 @@ class Tube {
       const Vec3 o{std::max({c.lo.x - p.x, p.x - c.hi.x, 0.0}), std::max({c.lo.y - p.y, p.y - c.hi.y, 0.0}),
                    std::max({c.lo.z - p.z, p.z - c.hi.z, 0.0})};
       const double away = length(o);
-      if (away > reach || away > best) {
+      if (away > reach || away > std::max(best, 0.0)) {
         best = std::min(best, away);
         continue;
       }
@@ -153,9 +155,9 @@ class Tube {
 
 // What differs between individuals, as sizes in mm or factors.
 struct Build {
-  Vec3 vault{1, 1, 1};        // factors of the cranium
-  double sinus_back = 0;      // sigmoid sinus
-  double bulb_up = 0;         // jugular bulb
+  Vec3 vault{1, 1, 1};    // factors of the cranium
+  double sinus_back = 0;  // sigmoid sinus
+  double bulb_up = 0;     // jugular bulb
   double nerve_back = 0, nerve_out = 0, nerve_long = 0, nerve_thick = 1;
   double canal_wide = 1;
   double tegmen_up = 0;
@@ -195,7 +197,7 @@ struct Tooth {
   double root = 0, up = 0;
 };
 
-constexpr Vec3 kMarker{74, -8, 45};
+constexpr Vec3 kMarker{72, -8, 46};
 constexpr double kMarkerRadius = 5;
 
 }  // namespace
@@ -214,7 +216,7 @@ struct HeadAnatomy::Model {
  private:
   // What is needed of a point more than once.
   struct Ear {
-    double canal = 1e9, cavity = 1e9, labyrinth = 1e9, nerve = 1e9, chorda = 1e9, meatus = 1e9, carotid = 1e9;
+    double canal = 1e9, drum = 1e9, cavity = 1e9, labyrinth = 1e9, nerve = 1e9, chorda = 1e9, meatus = 1e9, carotid = 1e9;
   };
   [[nodiscard]] Ear ear(Vec3 p) const;
   [[nodiscard]] double outer_vault(Vec3 p) const;
@@ -249,14 +251,28 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
   const Build& b = build;
   // The canal's axis: out to the skin through cartilage, S-shaped; the drum cuts it.
   const double w = b.canal_wide;
-  canal = Tube({{{39, -1.5, -20.6}, 3.3 * w}, {{45, 0, -20}, 3.4 * w}, {{51, 1.6, -18.9}, 3.1 * w}, {{57, 2.6, -18.6}, 3.6 * w},
-                {{63, 3.2, -19.2}, 4.0 * w}, {{70, 4.6, -19.6}, 3.8}, {{84, 8, -20}, 4.5}});
+  canal = Tube({{{39, -1.5, -20.6}, 3.3 * w},
+                {{45, 0.4, -20}, 3.6 * w},
+                {{51, 2.1, -18.9}, 3.4 * w},
+                {{57, 3.1, -18.6}, 3.7 * w},
+                {{63, 3.7, -19.2}, 4.0 * w},
+                {{70, 4.8, -19.6}, 3.8},
+                {{84, 8, -20}, 4.5}});
   // Facial nerve.
   const double t = b.nerve_thick, y = b.nerve_back, x = b.nerve_out, z = -b.nerve_long;
-  nerve = Tube({{{14, 5.6, -15.2}, 0.75 * t}, {{20, 4.2, -15.0}, 0.7 * t}, {{27, 2.6, -14.4}, 0.6 * t}, {{33.2, 1.2, -13.6}, 0.5 * t},
-                {{36.4, -2.0, -12.4}, 0.85 * t}, {{39.0, 2.6, -14.7}, 0.65 * t}, {{41.3, 6.6, -16.2}, 0.7 * t},
-                {{42.5 + 0.5 * x, 8.3 + 0.6 * y, -18.3}, 0.75 * t}, {{43.2 + x, 9.0 + y, -22}, 0.8 * t}, {{43.8 + x, 9.6 + y, -27}, 0.85 * t},
-                {{44.6 + x, 10.2 + y, -32.5 + z}, 0.9 * t}, {{46 + x, 7.5, -38.5 + z}, 0.9 * t}, {{51, -3, -45}, 0.9 * t}});
+  nerve = Tube({{{14, 5.6, -15.2}, 0.75 * t},
+                {{20, 4.2, -15.0}, 0.7 * t},
+                {{27, 2.6, -14.4}, 0.6 * t},
+                {{33.2, 1.2, -13.6}, 0.5 * t},
+                {{36.4, -2.0, -12.4}, 0.85 * t},
+                {{39.7, 2.5, -14.4}, 0.65 * t},
+                {{41.3, 6.6, -16.2}, 0.7 * t},
+                {{42.5 + 0.5 * x, 7.5 + 0.6 * y, -18.3}, 0.75 * t},
+                {{43.2 + x, 7.8 + y, -22}, 0.8 * t},
+                {{43.8 + x, 8.8 + y, -27}, 0.85 * t},
+                {{44.6 + x, 9.6 + y, -32.5 + z}, 0.9 * t},
+                {{46 + x, 7.5, -38.5 + z}, 0.9 * t},
+                {{51, -3, -45}, 0.9 * t}});
   {
     const auto& line = nerve.points();
     double arc = 0;
@@ -269,20 +285,56 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
     }
   }
   meatus = Tube({{{14, 6.2, -16.4}, 2.9}, {{21, 4.2, -15.9}, 2.5}, {{28, 2.6, -15.3}, 2.1}, {{32.6, 1.7, -14.8}, 1.6}});
-  chorda = Tube({{{43.6 + x, 9.4 + y, -25.5}, 0.3}, {{44.6, 7.6 + 0.5 * y, -22.2}, 0.25}, {{45.2, 5.3, -18.4}, 0.25}, {{44.2, 2.0, -15.6}, 0.25},
-                 {{43.6, -2.2, -15.4}, 0.25}, {{42.6, -6.5, -17}, 0.25}, {{42, -10, -20}, 0.25}});
+  chorda = Tube({{{43.6 + x, 8.6 + y, -25.5}, 0.3},
+                 {{44.6, 7.0 + 0.5 * y, -22.2}, 0.25},
+                 {{45.2, 5.0, -18.4}, 0.25},
+                 {{44.2, 2.0, -15.6}, 0.25},
+                 {{43.6, -2.2, -15.4}, 0.25},
+                 {{42.6, -6.5, -17}, 0.25},
+                 {{42, -10, -20}, 0.25}});
   const double s = b.sinus_back, u = b.bulb_up;
-  sinus = Tube({{{3, 79.5 * b.vault.y, -8}, 4.5}, {{22, 74.5 * b.vault.y, -6}, 4.5}, {{41, 57.5 * b.vault.y, -4}, 4.6}, {{53.5, 38 + s, -6.5}, 4.8},
-                {{54, 28 + s, -13}, 5}, {{51.5, 23.6 + s, -21}, 5}, {{48, 24 + s, -28}, 5}, {{43, 24.5 + 0.5 * s, -34}, 4.8}, {{38, 18, -34.5}, 4.6},
-                {{34.6, 10, -28.2 + u}, 4.6}, {{34, 8, -36}, 4.5}, {{35, 6, -52}, 5}, {{37, 4, -90}, 5.5}, {{38, 4, -140}, 5.5}});
-  carotid = Tube({{{32, -2, -140}, 2.8}, {{31, -3, -80}, 2.8}, {{31.5, -4.5, -44}, 2.7}, {{32.5, -6.5, -32}, 2.6}, {{32.0, -8.5, -26.5}, 2.5},
-                  {{26, -12.5, -23.5}, 2.5}, {{17, -19, -19}, 2.4}, {{11, -22, -11}, 2.3}, {{10.5, -30, -6}, 2.2}});
-  auditory_tube = Tube({{{41.2, -4.2, -17.6}, 1.6}, {{38.5, -9.5, -19.6}, 1.1}, {{33, -18, -23}, 0.8}, {{24, -30, -28.5}, 0.8}, {{13, -44, -34}, 1.6}});
-  arch_tube = Tube({{{47, -68, -19}, 6.0}, {{55, -60, -19.5}, 4.2}, {{61.5, -46, -19.5}, 3.2}, {{65, -30, -18}, 3.0}, {{64, -16, -15}, 3.6}, {{62, -4, -12}, 3.8}, {{60, 6, -10.5}, 3}});
-  alveolar = Tube({{{43.5 + 0.7 * b.gonion_out, -26, -58}, 1.5}, {{43 + 0.7 * b.gonion_out, -30, -70}, 1.4}, {{41.2 + 0.5 * b.gonion_out, -40, -84}, 1.3},
-                   {{36.5, -56, -92}, 1.3}, {{29.5, -70, -95}, 1.3}, {{25.5, -77.2, -94}, 1.3}, {{27.5, -82, -91}, 1.4}});
+  sinus = Tube({{{3, 79.5 * b.vault.y, -8}, 4.5},
+                {{22, 74.5 * b.vault.y, -6}, 4.5},
+                {{41, 57.5 * b.vault.y, -4}, 4.6},
+                {{53.5, 38 + s, -6.5}, 4.8},
+                {{54, 28 + s, -13}, 5},
+                {{51.5, 23.6 + s, -21}, 5},
+                {{48, 24 + s, -28}, 5},
+                {{43, 24.5 + 0.5 * s, -34}, 4.8},
+                {{38, 18, -34.5}, 4.6},
+                {{34.6, 10, -28.2 + u}, 4.6},
+                {{34, 8, -36}, 4.5},
+                {{35, 6, -52}, 5},
+                {{37, 4, -90}, 5.5},
+                {{38, 4, -140}, 5.5}});
+  carotid = Tube({{{32, -2, -140}, 2.8},
+                  {{31, -3, -80}, 2.8},
+                  {{31.5, -4.5, -44}, 2.7},
+                  {{32.5, -6.5, -32}, 2.6},
+                  {{32.0, -8.5, -26.5}, 2.5},
+                  {{26, -12.5, -23.5}, 2.5},
+                  {{17, -19, -19}, 2.4},
+                  {{11, -22, -11}, 2.3},
+                  {{10.5, -30, -6}, 2.2}});
+  auditory_tube =
+      Tube({{{41.2, -4.2, -17.6}, 1.6}, {{38.5, -9.5, -19.6}, 1.1}, {{33, -18, -23}, 0.8}, {{24, -30, -28.5}, 0.8}, {{13, -44, -34}, 1.6}});
+  arch_tube = Tube({{{47, -68, -19}, 6.0},
+                    {{55, -60, -19.5}, 4.2},
+                    {{61.5, -46, -19.5}, 3.2},
+                    {{65, -30, -18}, 3.0},
+                    {{64, -16, -15}, 3.6},
+                    {{62, -4, -12}, 3.8},
+                    {{60, 6, -10.5}, 3}});
+  alveolar = Tube({{{43.5 + 0.7 * b.gonion_out, -26, -58}, 1.5},
+                   {{43 + 0.7 * b.gonion_out, -30, -70}, 1.4},
+                   {{41.2 + 0.5 * b.gonion_out, -40, -84}, 1.3},
+                   {{36.5, -56, -92}, 1.3},
+                   {{29.5, -70, -95}, 1.3},
+                   {{25.5, -77.2, -94}, 1.3},
+                   {{27.5, -82, -91}, 1.4}});
   const double g = b.gonion_out;
-  jaw_line = Tube({{{-7, -88.7, 0}}, {{7, -88.7, 0}}, {{20, -82, 0}}, {{31, -67, 0}}, {{39.5 + 0.4 * g, -45, 0}}, {{45.5 + g, -22, 0}}}).points();
+  jaw_line =
+      Tube({{{-7, -88.7, 0}}, {{7, -88.7, 0}}, {{20, -82, 0}}, {{31, -67, 0}}, {{39.5 + 0.4 * g, -45, 0}}, {{45.5 + g, -22, 0}}}).points();
   // Cochlea: 2.5 turns about the modiolus, which points forward and outward. The radius shrinks as the spiral rises.
   {
     const Vec3 base{34.2, -2.4, -19.0}, axis = normalized({0.66, -0.72, -0.2});
@@ -298,9 +350,22 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
     cochlea = Tube(spiral);
   }
   // Teeth: widths along the row, across, crown height (Wheeler), root lengths.
-  constexpr std::array<std::array<double, 4>, 16> kTeeth{{{8.5, 7, 10.5, 13}, {6.5, 6, 9, 13}, {7.5, 8, 10, 17}, {7, 9, 8.5, 14}, {7, 9, 8.5, 14},
-                                                          {10, 11, 7.5, 12}, {9, 11, 7, 11}, {8.5, 10, 6.5, 11}, {5, 6, 9, 12.5}, {5.5, 6.5, 9.5, 14},
-                                                          {7, 7.5, 11, 16}, {7, 7.5, 8.5, 14}, {7, 8, 8, 14.5}, {11, 10.5, 7.5, 14}, {10.5, 10, 7, 13}, {10, 9.5, 7, 11}}};
+  constexpr std::array<std::array<double, 4>, 16> kTeeth{{{8.5, 7, 10.5, 13},
+                                                          {6.5, 6, 9, 13},
+                                                          {7.5, 8, 10, 17},
+                                                          {7, 9, 8.5, 14},
+                                                          {7, 9, 8.5, 14},
+                                                          {10, 11, 7.5, 12},
+                                                          {9, 11, 7, 11},
+                                                          {8.5, 10, 6.5, 11},
+                                                          {5, 6, 9, 12.5},
+                                                          {5.5, 6.5, 9.5, 14},
+                                                          {7, 7.5, 11, 16},
+                                                          {7, 7.5, 8.5, 14},
+                                                          {7, 8, 8, 14.5},
+                                                          {11, 10.5, 7.5, 14},
+                                                          {10.5, 10, 7, 13},
+                                                          {10, 9.5, 7, 11}}};
   for (int row = 0; row < 2; ++row) {
     const double rx = row == 0 ? 28.5 : 26.5, ry = row == 0 ? 44 : 41, y0 = -46;
     double angle = 0.25, total = 0;  // in turns from the front: x = rx sin, y = y0 - ry cos
@@ -327,7 +392,7 @@ HeadAnatomy::Model::Model(std::uint64_t individual) : build(build_of(individual)
       Tooth& tooth = teeth[static_cast<std::size_t>(row * 8 + i)];
       tooth.up = row == 0 ? 1 : -1;
       tooth.half = {0.5 * d[0] * fit - 0.12, 0.5 * d[1], 0.5 * d[2]};
-      tooth.centre = {rx * a.sin, ty + (row == 0 ? 0.0 : 1.0), occlusal + tooth.up * (0.35 + 0.5 * d[2])};
+      tooth.centre = {rx * a.sin, ty + (row == 0 ? 0.0 : 1.0), occlusal + tooth.up * ((row == 0 ? 1.2 : 2.4) + 0.5 * d[2])};
       tooth.along = normalized({rx * a.cos, ry * a.sin, 0});
       tooth.root = d[3];
     }
@@ -359,26 +424,30 @@ HeadAnatomy::Model::Ear HeadAnatomy::Model::ear(Vec3 p) const {
   const Vec3 centre{45, 0, -20}, out = normalized({0.78, -0.34, -0.52});
   const double drum = dot(p - centre, out);
   const Vec3 tall{p.x, p.y, -20 + (p.z + 20) * 0.86};
-  e.canal = smax(canal.distance(tall, 8), 0.12 - drum, 1);
-  // Tympanic cavity, sheared along the drum, with attic, aditus and antrum.
-  const Vec3 sheared{p.x + 0.32 * (p.z + 19.5), p.y, p.z};
-  double d = box(sheared, {41.6, -0.3, -19.2}, {2.3, 6.0, 6.2}, 2.2);
-  d = smax(d, drum + 0.12, 1.5);
-  d = smin(d, ellipsoid(p, {43.7, 1.4, -12.6}, {3.3, 5.0, 3.8}), 1.2);
-  d = smin(d, cone(p, {44.2, 5.0, -12.4}, {46.2, 10, -12.3}, 2.2, 2.6), 1.5);
-  d = smin(d, ellipsoid(p, {47.6, 14.2, -12.9}, {3.5, 6.3, 4.4}), 2);
-  d = smin(d, auditory_tube.distance(p, 5), 1.2);
-  e.cavity = d;
+  const double tube = canal.distance(tall, 8);
+  e.canal = std::max(tube, 0.12 - drum);
+  e.drum = std::max(tube, std::abs(drum) - 0.12);
   // Labyrinth.
   const Vec3 ridge = normalized({0.72, 0.69, 0}), back = normalized({-0.69, 0.72, 0}), level = normalized({0, 0.5, 0.87});
   const double k = build.canals;
   double l = ellipsoid(p, {36.4, 3.5, -16.1}, {1.6, 2.7, 2.3});
-  l = smin(l, torus(p, {36.2, 4.3, -12.4}, ridge, 3.2 * k, 0.55), 0.5);
+  l = smin(l, torus(p, {35.5, 4.3, -12.3}, ridge, 3.2 * k, 0.55), 0.5);
   l = smin(l, torus(p, {38.5, 8.6, -16.9}, back, 3.1 * k, 0.55), 0.5);
   l = smin(l, torus(p, {39.3, 6.5, -14.4}, level, 2.7 * k, 0.55), 0.5);
   l = smin(l, cochlea.distance(p, 5), 0.5);
   e.labyrinth = l;
   e.nerve = nerve.distance(p, 6);
+  // Tympanic cavity, sheared along the drum, with attic, aditus and antrum.
+  const Vec3 sheared{p.x - 0.2 * (p.z + 19.5), p.y, p.z};
+  double d = box(sheared, {42.1, -0.3, -19.2}, {2.9, 6.0, 6.2}, 2.2);
+  d = std::max(d, drum + 0.12);
+  d = smin(d, ellipsoid(p, {43.7, 1.4, -12.6}, {3.3, 5.0, 3.8}), 1.2);
+  d = smin(d, cone(p, {44.2, 5.0, -12.4}, {46.2, 10, -12.3}, 2.2, 2.6), 1.5);
+  d = smin(d, ellipsoid(p, {47.6, 14.2, -12.9}, {3.5, 6.3, 4.4}), 2);
+  d = smin(d, auditory_tube.distance(p, 5), 1.2);
+  d = smin(d, ellipsoid(p, {39.8, 3.2, -17.1}, {1.3, 1.8, 1.1}), 0.4);  // niche of the oval window
+  // The promontory covers the labyrinth, the facial canal's thin wall the nerve.
+  e.cavity = smax(smax(d, 0.6 - e.labyrinth, 0.4), 0.35 - e.nerve, 0.3);
   e.chorda = chorda.distance(p, 4);
   e.meatus = meatus.distance(p, 5);
   e.carotid = carotid.distance(p, 6);
@@ -414,10 +483,10 @@ double HeadAnatomy::Model::brain(Vec3 p, double vault, double sinus_d, const Ear
   const double across = (p.x - 54) * -0.69 + (p.y - 31) * 0.72;  // behind the ridge above 0
   double middle = mix(-3, -13, ramp(p.x, 9, 22));
   middle = mix(middle, -6.5 + build.tegmen_up, ramp(across, -27, -10));
-  const double ax = p.x - 36.2, ay = p.y - 4.3, bulge = std::max(0.0, 1 - (ax * ax + ay * ay) / 49);
+  const double ax = p.x - 35.7, ay = p.y - 4.3, bulge = std::max(0.0, 1 - (ax * ax + ay * ay) / 49);
   middle += 1.9 * bulge * bulge + 1.2 * ramp(across, -7, -1);
-  const double floor = mix(4, middle, ramp(p.y, -55, -42));
-  const double above = (floor - p.z) * 0.85;
+  const double floor = mix(4, middle, ramp(p.y, -60, -40));
+  const double above = (floor - p.z) * 0.75;
   // Posterior fossa: behind the petrous bone and the clivus.
   const Vec3 back = normalized({-0.69, 0.72, 0.17}), clivus = normalized({0, 0.85, 0.53});
   const double behind = smax(-dot(p - Vec3{54, 31, -4.5}, back), -dot(p - Vec3{0, -21, -5}, clivus), 6);
@@ -467,11 +536,13 @@ double HeadAnatomy::Model::tooth(Vec3 p) const {
     const bool molar = t.half.x > 4 && t.half.y > 4.5;
     const double blade = molar || t.half.y > 4 ? 1 : mix(0.45, 1, ramp(q.z, -t.half.z, t.half.z));
     const double neck = mix(1, 0.78, ramp(q.z, 0, t.half.z));
-    double crown = box({q.x / neck, q.y / (blade * neck), q.z}, {}, {t.half.x, t.half.y, t.half.z}, std::min(t.half.x, t.half.y) * 0.62) * 0.7;
+    double crown =
+        box({q.x / neck, q.y / (blade * neck), q.z}, {}, {t.half.x, t.half.y, t.half.z}, std::min(t.half.x, t.half.y) * 0.62) * 0.7;
     double root = 1e9;
     if (molar) {
       for (const double side : {-1.0, 1.0}) {
-        root = std::min(root, cone(q, {side * t.half.x * 0.4, 0, t.half.z * 0.6}, {side * t.half.x * 0.55, 0, t.half.z + t.root}, t.half.x * 0.45, 1.0));
+        root = std::min(root, cone(q, {side * t.half.x * 0.4, 0, t.half.z * 0.6}, {side * t.half.x * 0.55, 0, t.half.z + t.root},
+                                   t.half.x * 0.45, 1.0));
       }
     } else {
       root = cone(q, {0, 0, t.half.z * 0.6}, {0, 0, t.half.z + t.root}, std::min(t.half.x, t.half.y) * 0.72, 0.9);
@@ -505,7 +576,7 @@ double HeadAnatomy::Model::mandible(Vec3 p) const {
   sheet = smin(sheet, segment2(p.y, p.z, -35, -74, -31, -55) - 12, 6);
   const double at = mix(45 + g, 48.5, ramp(p.z, -80, -30));
   const double ramus = smax(sheet, std::abs(p.x - at) - mix(4.4, 3.2, ramp(p.z, -80, -40)), 4) * 0.95;
-  double condyle = ellipsoid(p, {50.5, -13.5, -23.2}, {9.5, 4.4, 5});
+  double condyle = ellipsoid(p, {50.5, -13.5, -23.7}, {9.5, 4.4, 5});
   condyle = smin(condyle, cone(p, {50, -14, -25}, {48.5, -15, -42}, 4.2, 4.6), 5);
   return smin(smin(body, ramus, 8), condyle, 4);
 }
@@ -550,9 +621,9 @@ double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double or
   double under = mix(-24 - 0.42 * (p.y + 40), -17.5, ramp(p.x, 14, 26));
   under = mix(under, -32.2, ramp(p.y, -14, -2));
   const double behind = (p.x - 54) * -0.69 + (p.y - 31) * 0.72 - 5.7;  // the posterior fossa at the base
-  under = mix(under, -50, ramp(behind, -7, 0) * ramp(p.y, -24, -10));
+  under = mix(under, -50, ramp(behind, -12, 1) * ramp(p.y, -32, -10));
   under = mix(1, under, ramp(p.y, -56, -44));
-  double d = smax(vault, (under - p.z) * 0.75, 4);
+  double d = smax(vault, (under - p.z) * 0.55, 4);
   // Temporal bone: mastoid with its tip, ring of the ear canal, styloid process, eminence before the joint.
   const double o = build.mastoid_out;
   d = smin(d, ellipsoid(p, {52.8 + 0.5 * o, 20.5, -16}, {11.2, 17, 17}), 6);
@@ -569,7 +640,7 @@ double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double or
   d = smax(d, -brain_d, 1);
   d = smax(d, -orbit_d, 1);
   d = smax(d, -nasal_d, 1);
-  d = smax(d, -ellipsoid(p, {50.5, -13, -24.2}, {13, 7.8, 8.6}), 3);  // joint
+  d = smax(d, -ellipsoid(p, {50.5, -13, -24.2}, {13, 7.8, 8.6}), 3);           // joint
   d = smax(d, -cone(p, {48.5, 28, -46.5}, {46.8, 14.5, -38.8}, 3.4, 3.0), 2);  // digastric groove
   const double mx = p.x / 15, my = (p.y - 17) / 18;
   d = smax(d, -smax((std::sqrt(mx * mx + my * my) - 1) * 14, p.z + 26, 4), 3);  // foramen magnum
@@ -641,7 +712,8 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
   const Vec3 antrum{47.6, 14.2, -12.9};
   for (int i = 0; i < 14000; ++i) {
     const Vec3 p{random.uniform(lo.x, hi.x), random.uniform(lo.y, hi.y), random.uniform(lo.z, hi.z)};
-    const double shrink = mix(1.5, 0.42, std::min(1.0, i / 9000.0)), draw = portable::exp(0.28 * random.normal()), wall = random.uniform(0.35, 0.7);
+    const double shrink = mix(1.5, 0.42, std::min(1.0, i / 9000.0)), draw = portable::exp(0.28 * random.normal()),
+                 wall = random.uniform(0.35, 0.7);
     const double local = mix(0.85, 1.6, std::clamp((length(p - antrum) - 8) / 22, 0.0, 1.0));
     const double r = std::clamp(1.4 * build.cell_size * local * draw * shrink, 0.55, 3.2);
     bool free = true;
@@ -713,7 +785,8 @@ void HeadAnatomy::Model::place_cells(std::uint64_t seed) {
         for (std::size_t c = 0; c < n; ++c)
           if (f[c] <= second + 2 * half + 0.8) near_cells[at].push_back(static_cast<std::uint16_t>(c));
         for (std::size_t c = 0; c < n; ++c)
-          if (cone(centre, ducts[c].a, ducts[c].b, ducts[c].radius, ducts[c].radius) < half + 0.8) near_ducts[at].push_back(static_cast<std::uint16_t>(c));
+          if (cone(centre, ducts[c].a, ducts[c].b, ducts[c].radius, ducts[c].radius) < half + 0.8)
+            near_ducts[at].push_back(static_cast<std::uint16_t>(c));
       }
 }
 
@@ -731,7 +804,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
   if (!inside(skin_d)) return is(Tissue::air);
   // The ear's parts lie in a box; beyond it and a rim they decide nothing.
   const Vec3 lo{8, -50, -70}, hi{80, 40, -2};
-  const double away = length(Vec3{std::max({lo.x - p.x, p.x - hi.x, 0.0}), std::max({lo.y - p.y, p.y - hi.y, 0.0}), std::max({lo.z - p.z, p.z - hi.z, 0.0})});
+  const double away = length(
+      Vec3{std::max({lo.x - p.x, p.x - hi.x, 0.0}), std::max({lo.y - p.y, p.y - hi.y, 0.0}), std::max({lo.z - p.z, p.z - hi.z, 0.0})});
   constexpr double kRim = 4;
   const bool near_ear = away < kRim;
   Ear e;
@@ -748,6 +822,7 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
     if (inside(ossicles(p))) return is(Tissue::ossicle);
     if (inside(e.cavity)) return is(Tissue::tympanic_cavity);
     if (inside(e.canal)) return is(Tissue::ear_canal);
+    if (inside(e.drum)) return is(Tissue::soft);
     if (inside(e.labyrinth)) return is(Tissue::labyrinth);
     if (inside(e.meatus)) return is(Tissue::soft);
   }
@@ -792,7 +867,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
   }
   if (near_ear) {
     // Openings between the cells and to the antrum go through any wall but those to what must not be opened.
-    const double kept = std::min({e.nerve - 0.8, e.chorda - 0.3, e.labyrinth - 1.3, e.canal - 1.0, sinus_d - 0.9, brain_d - 0.8, -bone - 1.5});
+    const double kept =
+        std::min({e.nerve - 0.8, e.chorda - 0.3, e.labyrinth - 1.3, e.canal - 1.0, sinus_d - 0.9, brain_d - 0.8, -bone - 1.5});
     if (inside(in_duct(p)) && !inside(kept)) return is(Tissue::air_cells);
     const double region = cell_region(p, bone, brain_d, sinus_d, e);
     if (inside(region, 0.5)) {
@@ -802,7 +878,8 @@ HeadAnatomy::Sample HeadAnatomy::Model::sample(Vec3 world) const {
       return is(Tissue::cellular);
     }
     // The petrous bone is dense around what it holds.
-    if (inside(e.labyrinth, 2.0) || inside(e.nerve, 0.9) || inside(e.canal, 1.2) || inside(e.cavity, 1.0) || inside(e.meatus, 1.0) || inside(e.carotid, 1.0))
+    if (inside(e.labyrinth, 2.0) || inside(e.nerve, 0.9) || inside(e.canal, 1.2) || inside(e.cavity, 1.0) || inside(e.meatus, 1.0) ||
+        inside(e.carotid, 1.0))
       return is(Tissue::cortical);
   }
   if (inside(bone, -1.6) && !inside(sinus_d, 1.2)) return is(Tissue::diploe);

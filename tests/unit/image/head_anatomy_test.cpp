@@ -156,7 +156,7 @@ TEST(HeadAnatomy, FacialNerveHasPublishedLengthsAndLiesWhereItsLineSays) {
 TEST(HeadAnatomy, TubesAreOnePieceInTheLabels) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;
-  p.spacing_mm = 0.45;
+  p.spacing_mm = 0.6;
   p.noise_hu = 0;
   for (const int who : {0, 6}) {
     p.individual = who;
@@ -190,7 +190,8 @@ TEST(HeadAnatomy, TubesAreOnePieceInTheLabels) {
         }
       }
       // The jugular vein leaves the block at no side: all of it is one. The auditory tube is thinner than two voxels.
-      EXPECT_GE(static_cast<double>(reached), (t == Tissue::tympanic_cavity ? 0.9 : 1.0) * static_cast<double>(all)) << tissue_name(t) << " of " << who;
+      EXPECT_GE(static_cast<double>(reached), (t == Tissue::tympanic_cavity ? 0.9 : 1.0) * static_cast<double>(all))
+          << tissue_name(t) << " of " << who;
     }
   }
 }
@@ -258,7 +259,8 @@ TEST(HeadAnatomy, PlatesAndTablesAreAsThickAsPublished) {
       ++air;
       const Vec3 q = p + normalized({one(random), one(random), one(random)}) * 0.45;
       const Tissue t = head.tissue(q);
-      EXPECT_TRUE(t == Tissue::air_cells || t == Tissue::cellular || t == Tissue::cortical || t == Tissue::tympanic_cavity || t == Tissue::diploe)
+      EXPECT_TRUE(t == Tissue::air_cells || t == Tissue::cellular || t == Tissue::cortical || t == Tissue::tympanic_cavity ||
+                  t == Tissue::diploe)
           << tissue_name(t) << " of " << i;
     }
     EXPECT_GT(air, 2000) << i;
@@ -277,7 +279,8 @@ TEST(HeadAnatomy, AirCellsHaveRandomSizesAndAreOneAir) {
       EXPECT_GE(c.wall_mm, 0.35);
       EXPECT_LE(c.wall_mm, 0.7);
     }
-    const double mean = sum / static_cast<double>(cells.size()), deviation = std::sqrt(squares / static_cast<double>(cells.size()) - mean * mean);
+    const double mean = sum / static_cast<double>(cells.size()),
+                 deviation = std::sqrt(squares / static_cast<double>(cells.size()) - mean * mean);
     EXPECT_NEAR(mean, 2.8, 1.0) << i;
     EXPECT_GT(deviation / mean, 0.2) << i;  // no lattice
     first.push_back(cells.front().centre_mm.x);

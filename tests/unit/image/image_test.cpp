@@ -219,7 +219,8 @@ TEST(Phantom, VoxelsHoldTheMeanOverTheirVolume) {
   double sum = 0, squares = 0;
   int voxels = 0;
   for (; voxels < 200; ++voxels) {
-    const std::array<int, 3> v{10 + static_cast<int>(random() % 10), 12 + static_cast<int>(random() % 20), 6 + static_cast<int>(random() % 24)};
+    const std::array<int, 3> v{10 + static_cast<int>(random() % 10), 12 + static_cast<int>(random() % 20),
+                               6 + static_cast<int>(random() % 24)};
     double mean = 0;
     for (int n = 0; n < 27; ++n) {
       const double weight = (n % 3 == 1 ? 4 : 1) * (n / 3 % 3 == 1 ? 4 : 1) * (n / 9 == 1 ? 4 : 1) / 216.0;

@@ -87,9 +87,22 @@ TEST(Truth, SurfaceWithinHalfAVoxelOfTheExactBoundary) {
 
 TEST(Truth, DefaultStrokesDrillTheChosenSide) {
   const BrickGrid bone = to_bricks(head().bone.density);
+  const HeadAnatomy truth;
+  const auto nerve = truth.facial_nerve();
   for (const bool left : {true, false}) {
     const Script s = make_default_script(World(BrickGrid(bone)), left, 3, 5);
-    for (const auto& w : s.waypoints) EXPECT_GT(w.at_mm.x * (left ? 1 : -1), 30);
+    // Into the mastoid's outside, and clear of the facial nerve.
+    double reach = 1e9, clearance = 1e9;
+    for (const auto& w : s.waypoints) {
+      const Vec3 at{w.at_mm.x * (left ? 1 : -1), w.at_mm.y, w.at_mm.z};
+      EXPECT_GT(at.x, 45);
+      EXPECT_NEAR(at.y, 15, 20);
+      EXPECT_NEAR(at.z, -27, 20);
+      reach = std::min(reach, at.x);
+      for (const TubePoint& n : nerve) clearance = std::min(clearance, length(at - n.at_mm) - n.radius_mm);
+    }
+    EXPECT_LT(reach, 64);
+    EXPECT_GT(clearance - burr_library()[3].diameter_mm / 2, 2);
     Rehearsal rehearsal(World(BrickGrid(bone)), std::make_unique<ScriptedDevice>(s, 1000), {}, {});
     EXPECT_GT(rehearsal.run_to_end({}).removed_mm3, 5);
   }

@@ -51,8 +51,10 @@ inline constexpr int kTissueCount = 20;
     case Tissue::left_marker:
     case Tissue::diploe:
     case Tissue::jaw_marrow:
-    case Tissue::tooth: return true;
-    default: return false;
+    case Tissue::tooth:
+      return true;
+    default:
+      return false;
   }
 }
 
@@ -62,7 +64,8 @@ struct TubePoint {
   double radius_mm = 0;
 };
 
-/// A cell of the mastoid: a ball that the cell fills until it meets the walls to its neighbours, half as far from the one as from the other.
+/// A cell of the mastoid: a ball that the cell fills until it meets the walls to its neighbours, half as far from the one as from the
+/// other.
 struct AirCell {
   Vec3 centre_mm;
   double radius_mm = 0;
