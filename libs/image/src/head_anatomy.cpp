@@ -634,6 +634,8 @@ double HeadAnatomy::Model::skull(Vec3 p, double vault, double brain_d, double or
   d = smin(d, ellipsoid(p, {53, -25, -17.5}, {9, 5, 5}), 4);
   d = smin(d, face(p, orbit_d, nasal_d), 4);
   d = smin(d, ellipsoid(p, {0, 84 * build.vault.y, -10}, {9, 5, 6}), 6);
+  // The plate under the sigmoid sinus, to where it leaves for the jugular foramen.
+  d = smin(d, smax(sinus_d - 1.4, 20 - p.y, 1), 2);
   // Occipital condyles.
   d = smin(d, ellipsoid(p, {17, 4, -40}, {6, 11, 6}), 3);
   // What is hollow.
