@@ -64,10 +64,11 @@ struct VoxelMean {
 VoxelMean voxel_mean(const HeadAnatomy& head, Vec3 centre, Vec3 spacing) {
   const HeadAnatomy::Sample s = head.sample(centre);
   VoxelMean v{s.tissue, tissue_hu(s.tissue), is_bone(s.tissue) ? 1.0 : 0.0};
-  if (s.margin_mm >= length(spacing) / 3) return v;
+  if (s.margin_mm >= 0.5 * length(spacing)) return v;
   v.hu = v.bone = 0;
+  // A lattice of rank 1 about the centre: 27 levels along every axis, where a cubic one has three and leaves terraces on surfaces.
   for (int n = 0; n < 27; ++n) {
-    const Vec3 offset{(n % 3 - 1) * spacing.x / 3, (n / 3 % 3 - 1) * spacing.y / 3, (n / 9 - 1) * spacing.z / 3};
+    const Vec3 offset{(n - 13) * spacing.x / 27, ((8 * n + 17) % 27 - 13) * spacing.y / 27, ((10 * n + 18) % 27 - 13) * spacing.z / 27};
     const Tissue t = length(offset) < s.margin_mm ? s.tissue : head.tissue(centre + offset);
     v.hu += tissue_hu(t) / 27;
     v.bone += is_bone(t) ? 1.0 / 27 : 0;
