@@ -198,7 +198,7 @@ struct Tooth {
 };
 
 constexpr Vec3 kMarker{72, -8, 46};
-constexpr double kMarkerRadius = 5;
+constexpr double kMarkerRadius = 6;
 
 }  // namespace
 
