@@ -22,7 +22,7 @@ _osteo() {
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
-    "phantom --region") COMPREPLY=($(compgen -W "head temporal " -- "$cur")); return ;;
+    "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "scene --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
@@ -57,7 +57,7 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
-    phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --labels-out" ;;
+    phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
     series) flags="$flags --studies" ;;

@@ -80,21 +80,25 @@ std::vector<Data> StructuresStage::run(const Params& params, std::span<const Dat
 }
 
 StageInfo PhantomStage::info() {
-  return {.name = "phantom",
-          .version = 1,
-          .synopsis = "a synthetic CT of a head whose every boundary is known",
-          .description =
-              "Cortical and cellular bone, facial nerve canals, sigmoid sinuses, ossicles, a jaw, and a bead on the left side "
-              "only. Voxels hold the mean over their volume plus noise (--seed). Give a folder as output for a DICOM series.",
-          .inputs = {},
-          .outputs = {{"image", {DataKind::image}, "CT in HU"},
-                      {"labels",
-                       {DataKind::labels},
-                       "exact tissue at each voxel centre: 2 cortical, 3 cellular, 4 mandible, "
-                       "5 ossicle, 6 facial nerve, 7 sigmoid sinus, 8 left marker",
-                       true}},
-          .references = {},
-          .example = "osteo phantom ct.nrrd --labels-out labels.nrrd --region temporal --spacing-mm 0.5"};
+  return {
+      .name = "phantom",
+      .version = 2,
+      .synopsis = "a synthetic CT of a head whose every boundary is known",
+      .description =
+          "Skull, jaw with teeth, and temporal bones with air cells, ear canal, ossicles, labyrinth, facial nerve, sigmoid sinus and "
+          "tegmen in sizes of published anatomy, and a bead on the left side only. Voxels hold the mean over their volume, spread as by "
+          "a scanner, plus noise (--seed). Give a folder as output for a DICOM series.",
+      .inputs = {},
+      .outputs =
+          {{"image", {DataKind::image}, "CT in HU"},
+           {"labels",
+            {DataKind::labels},
+            "exact tissue at each voxel centre: 0 air, 1 soft tissue, 2 cortical bone, 3 walls of air cells, 4 mandible, 5 ossicles, "
+            "6 facial nerve, 7 sigmoid sinus, 8 left marker, 9 diploe, 10 marrow of the jaw, 11 teeth, 12 labyrinth, 13 chorda "
+            "tympani, 14 alveolar nerve, 15 carotid artery, 16 dura, 17 air cells, 18 ear canal, 19 tympanic cavity",
+            true}},
+      .references = {},
+      .example = "osteo phantom ct.nrrd --labels-out labels.nrrd --region temporal --spacing-mm 0.5"};
 }
 
 std::vector<Data> PhantomStage::run(const Params& params, std::span<const Data>, const Context& context) {

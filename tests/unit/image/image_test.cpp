@@ -171,18 +171,22 @@ TEST(Phantom, SameBytesForAnyThreadCount) {
 }
 
 TEST(Phantom, HoldsEveryTissueAndTheMarkerOnlyAtTheLeft) {
-  PhantomParams p;
-  p.spacing_mm = 2;
-  const auto phantom = make_phantom(p);
   std::map<int, int> seen;
-  for (int k = 0; k < phantom.labels.frame.dims[2]; ++k)
-    for (int j = 0; j < phantom.labels.frame.dims[1]; ++j)
-      for (int i = 0; i < phantom.labels.frame.dims[0]; ++i) {
-        const int l = phantom.labels.at(i, j, k);
-        ++seen[l];
-        if (l != static_cast<int>(Tissue::left_marker)) continue;
-        EXPECT_GT(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}).x, 0);
-      }
+  for (const PhantomRegion region : {PhantomRegion::head, PhantomRegion::temporal, PhantomRegion::mandible}) {
+    PhantomParams p;
+    p.region = region;
+    p.spacing_mm = region == PhantomRegion::temporal ? 0.8 : 2;
+    const auto phantom = make_phantom(p);
+    const Frame& f = phantom.labels.frame;
+    for (int k = 0; k < f.dims[2]; ++k)
+      for (int j = 0; j < f.dims[1]; ++j)
+        for (int i = 0; i < f.dims[0]; ++i) {
+          const int l = phantom.labels.at(i, j, k);
+          ++seen[l];
+          if (l != static_cast<int>(Tissue::left_marker)) continue;
+          EXPECT_GT(f.world_from_index({double(i), double(j), double(k)}).x, 0);
+        }
+  }
   for (int t = 0; t < kTissueCount; ++t) EXPECT_GT(seen[t], 0) << tissue_name(static_cast<Tissue>(t));
 }
 
@@ -190,13 +194,59 @@ TEST(Phantom, LabelsAreTheExactTissue) {
   PhantomParams p;
   p.region = PhantomRegion::temporal;
   p.spacing_mm = 2;
+  p.individual = 3;
   const auto phantom = make_phantom(p);
-  for (int k = 0; k < phantom.labels.frame.dims[2]; k += 3)
-    for (int j = 0; j < phantom.labels.frame.dims[1]; j += 3)
-      for (int i = 0; i < phantom.labels.frame.dims[0]; i += 3) {
+  const HeadAnatomy head(3);
+  for (int k = 0; k < phantom.labels.frame.dims[2]; ++k)
+    for (int j = 0; j < phantom.labels.frame.dims[1]; ++j)
+      for (int i = 0; i < phantom.labels.frame.dims[0]; ++i) {
         EXPECT_EQ(phantom.labels.at(i, j, k),
-                  static_cast<int>(phantom_tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
+                  static_cast<int>(head.tissue(phantom.labels.frame.world_from_index({double(i), double(j), double(k)}))));
       }
+}
+
+// The CT without noise against a mean of many random points a voxel, spread as the scanner does.
+TEST(Phantom, VoxelsHoldTheMeanOverTheirVolume) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 2;
+  p.noise_hu = 0;
+  const auto phantom = make_phantom(p);
+  const HeadAnatomy head;
+  const Frame& f = phantom.ct.frame;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> in(-0.5, 0.5);
+  double sum = 0, squares = 0;
+  int voxels = 0;
+  for (; voxels < 200; ++voxels) {
+    const std::array<int, 3> v{10 + static_cast<int>(random() % 10), 12 + static_cast<int>(random() % 20),
+                               6 + static_cast<int>(random() % 24)};
+    double mean = 0;
+    for (int n = 0; n < 27; ++n) {
+      const double weight = (n % 3 == 1 ? 4 : 1) * (n / 3 % 3 == 1 ? 4 : 1) * (n / 9 == 1 ? 4 : 1) / 216.0;
+      constexpr int kPoints = 60;
+      for (int s = 0; s < kPoints; ++s) {
+        const Vec3 at{v[0] + n % 3 - 1 + in(random), v[1] + n / 3 % 3 - 1 + in(random), v[2] + n / 9 - 1 + in(random)};
+        mean += weight * tissue_hu(head.tissue(f.world_from_index(at))) / kPoints;
+      }
+    }
+    const double error = phantom.ct.at(v[0], v[1], v[2]) - mean;
+    sum += error;
+    squares += error * error;
+  }
+  EXPECT_NEAR(sum / voxels, 0, 12);
+  EXPECT_LT(std::sqrt(squares / voxels), 60);  // of 27 regular and 60 random points a voxel
+}
+
+TEST(Phantom, AnotherIndividualIsAnotherHead) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 2;
+  const auto a = make_phantom(p), again = make_phantom(p);
+  p.individual = 1;
+  const auto b = make_phantom(p);
+  EXPECT_TRUE(std::equal(a.labels.span().begin(), a.labels.span().end(), again.labels.span().begin()));
+  EXPECT_FALSE(std::equal(a.labels.span().begin(), a.labels.span().end(), b.labels.span().begin()));
 }
 
 }  // namespace
