@@ -190,7 +190,7 @@ def keys():
         key("u", "out", lambda s: not s["leading"] and s["message"] == "drill lifted out" and s["force_n"] == 0)
         out = w.state()
         assert dot([a - b for a, b in zip(out["at_mm"], out["centre_mm"])], out["eye"]) > 20, out
-        # A session of V alone holds its suction, and nothing else.
+        # A session of V alone holds a sucker whose pedal is down, and nothing else.
         first = key("F5", "another session", lambda s: s["session"] != "first" and s["tick"] > 0)["session"]
         w.x("key", "v")
         w.next(4)
@@ -229,7 +229,8 @@ def keys():
         assert s in said
     summary, _ = closed("first")
     assert summary["removed_mm3"] > 1 and summary["dust_mm3"]["sucked_off"] >= 0, summary
-    assert closed(first)[1]["actions"] >= 2
+    assert closed(first)[1]["actions"] == 0
+    assert any(r["hand"] == "1" and r["pedal"] == "255" for r in ticks(first))
     assert closed(second)[0]["sawn_mm3"] > 10
     assert closed(third)[1]["actions"] == 0
     assert (pathlib.Path(second) / "session.json").read_text().count("resumed_from") == 1
