@@ -104,11 +104,14 @@ TEST(Artefacts, ConeBeamOfTheJaws) {
     SCOPED_TRACE(std::to_string(c.gain) + " " + std::to_string(c.offset));
     const Image grey = cone_beam(head.ct, c);
     const Verdict v = judged(grey);
-    if (c.gain != 1) {
+    // Greys at 0.8 times HU, with soft tissue where HU have it, cannot be told from a noisy CT's: then the threshold has to be right.
+    const bool far_off = c.gain != 1 && c.gain != 0.8;
+    if (far_off) {
       EXPECT_FALSE(v.values.plausible);
       EXPECT_NE(v.status(), "good");
     }
     expect_sensible(grey, truth);
+    if (c.gain == 0.8) EXPECT_NEAR(guide_threshold(grey).presets[0].volume_mm3 / truth, 1, 0.1);
   }
 }
 
