@@ -112,9 +112,6 @@ osteo("phantom", "fine-ear.nrrd", "--region", "temporal", "--spacing-mm", 0.4, "
 osteo("snapshot", "fine-ear.nrrd", here / "phantom-ear.png", "--force", "--centre-mm", "42.6,3,-15.5", "--view", "left", "--bone-hu", 500)
 osteo("snapshot", "ct.nrrd", here / "phantom-head.png", "--force", "--centre-mm", "50,10,-19", "--view", "front", "--bone-hu", 500)
 osteo("snapshot", "ct.nrrd", here / "preview.png", "--force", "--bone-hu", 500)
-for record in here.glob("*.prov.json"):
-    record.unlink()
-shutil.rmtree(work)
 
 # A temporal bone's surface as tetrahedra that follow it.
 osteo("phantom", "temporal.nrrd", "--region", "temporal", "--spacing-mm", 1.5)
@@ -123,3 +120,7 @@ osteo("resample", "temporal.nrrd", "temporal-mask.nrrd", "temporal.vdb", "--lowe
 osteo("surface", "temporal.vdb", "temporal.ply")
 osteo("tetrahedralize", "temporal.ply", "temporal.vtu", "--spacing-mm", 2.5)
 picture("temporal.vtu", "guide-tetrahedra.png", "--view", "left")
+
+for record in here.glob("*.prov.json"):
+    record.unlink()
+shutil.rmtree(work)
