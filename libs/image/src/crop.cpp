@@ -12,7 +12,8 @@ namespace {
 
 struct Skull {
   Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-  double top_mm2 = 0;  // bone cut by the end of the scan that is nearest to the head's top
+  double top_mm2 = 0;        // bone cut by the end of the scan that is nearest to the head's top
+  bool top_at_side = false;  // and at a side of the scan as well: a block out of a head
 };
 
 // Bounds of the largest piece of bone, on every other voxel.
@@ -59,7 +60,9 @@ Skull find_skull(const Image& ct) {
     }
     for (std::uint32_t x = run.begin; x < run.end; ++x) {
       const std::array<int, 3> index{static_cast<int>(x), y, z};
-      if (index[up] == last) s.top_mm2 += pixel;
+      if (index[up] != last) continue;
+      s.top_mm2 += pixel;
+      for (std::size_t a = 0; a < 3; ++a) s.top_at_side = s.top_at_side || (a != up && (index[a] == 0 || index[a] == f.dims[a] - 1));
     }
   }
   return s;
@@ -120,7 +123,7 @@ Box find_region(const Image& ct, const CropParams& p) {
   if (!size_given) size = p.region == Region::jaw ? Vec3{140, 115, 95} : Vec3{70, 85, 75};
   if (p.region != Region::box && !centre_given) {
     const Skull s = find_skull(ct);
-    if (s.top_mm2 > 600) {
+    if (s.top_mm2 > 600 || s.top_at_side) {
       throw Error(ExitCode::failed,
                   "the scan does not reach the top of the head, by which " +
                       std::string(EnumNames<Region>::values[static_cast<std::size_t>(p.region)]) + " is found",
