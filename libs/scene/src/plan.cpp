@@ -72,6 +72,7 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
   j["osteotome_plan"] = 1;
   j["units"] = "mm, LPS; transforms take points of the case to where they are now";
   j["pieces"] = Json::list();
+  j["pieces_without_bone"] = Json::list();  // by their numbers: sawn or drilled away
   constexpr double kWarnPercent = 0.1;
   const double steps = static_cast<double>(world.bodies().size() + world.fixtures().size());
   double done = 0;
@@ -79,6 +80,11 @@ std::string write_plan(const World& world, const fs::path& folder, const Context
     context.progress(done++ / steps, "pieces");
     const std::string name = "piece-" + std::to_string(b.body->id) + ".stl";
     const VolumeSurface surface = surface_of_volume(b.body->bone, context);
+    if (surface.mesh.triangles.empty()) {
+      context.warn("piece " + std::to_string(b.body->id) + ": no bone is left of it, so it has no file");
+      j["pieces_without_bone"].push_back(b.body->id);
+      continue;
+    }
     save_surface(moved(surface.mesh, b.world_from_body), folder / name);
     const double off_percent = surface.bone_mm3 > 0 ? 100 * (surface.surface_mm3 / surface.bone_mm3 - 1) : 0;
     if (std::abs(off_percent) > kWarnPercent)
