@@ -411,7 +411,7 @@ TEST(Script, SchemaAndReaderAgree) {
         right[key] = "miniplate-4";
       else if (key == "pieces")
         right[key] = {0, 1};
-      else if (k["type"] == "array")
+      else if (k.value("type", "") == "array")
         right[key] = key == "along" ? nlohmann::json{0, 1, 0} : nlohmann::json{1, 0, 0};
       else
         right[key] = k.contains("default") ? k["default"] : k["minimum"];
@@ -437,7 +437,7 @@ TEST(Script, SchemaAndReaderAgree) {
         auto edge = right, beyond = right;
         const double v = k[end];
         edge[key] = k[end];
-        if (k["type"] == "integer") edge[key] = static_cast<int>(v);
+        if (k.value("type", "") == "integer") edge[key] = static_cast<int>(v);
         beyond[key] = v + (std::string(end) == "minimum" ? -1 : 1);
         EXPECT_TRUE(with(edge)) << name << key << v;
         EXPECT_FALSE(with(beyond)) << name << key << v;
