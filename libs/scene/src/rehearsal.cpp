@@ -94,9 +94,10 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   };
   const Operation::Done done = [&](const World::Effect& e) { hub_.scene_changed(e); };
   World::Effect effect;
+  std::unique_lock scene(mutex_, std::defer_lock);
   if (live) {
     // Nobody looks at the scene while it changes; the wait for the servo is of a tick or two.
-    const std::lock_guard lock(mutex_);
+    scene.lock();
     auto live_effect = operation_.act_live(
         action, [&] { return running(); }, [&] { drain(); }, done, components);
     if (!live_effect) return false;
@@ -107,6 +108,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   }
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
   if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(readers_->large_pieces().size());
+  if (live) scene.unlock();
   if (!effect.message.empty() && !row_of(action).made_often) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
