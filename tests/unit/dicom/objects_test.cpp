@@ -208,7 +208,8 @@ TEST(Objects, SegmentationsAreReadHoweverTheyArePacked) {
     sequence->insert(item);
   }
   auto* const pixels = new DcmPixelData(DcmTag(DCM_PixelData, EVR_OB));
-  pixels->putOriginalRepresentation(EXS_RLELossless, new DcmRLERepresentationParameter, sequence);
+  const DcmRLERepresentationParameter rle;  // copied
+  pixels->putOriginalRepresentation(EXS_RLELossless, &rle, sequence);
   d.insert(pixels, OFTrue);
   ASSERT_TRUE(file.saveFile((out / "bits-rle.dcm").c_str(), EXS_RLELossless).good());
   expect_read(out / "bits-rle.dcm");
