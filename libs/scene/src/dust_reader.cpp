@@ -4,8 +4,18 @@
 #include <cmath>
 
 #include "osteo/bone/instrument.h"
+#include "osteo/grid/brick_places.h"
 
 namespace osteo {
+namespace {
+
+// The voxel that a point of the grid's own world lies in.
+VoxelKey voxel_at(const BrickGrid& grid, Vec3 at_mm) {
+  const Vec3 x = grid.frame().index_from_world(at_mm);
+  return grid.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z)));
+}
+
+}  // namespace
 
 DustReader::DustReader(const World& world, double rate_hz) : rate_hz_(rate_hz) {
   begin(world);
@@ -33,17 +43,13 @@ DustReader::Bone* DustReader::owner(VoxelKey name) {
 }
 
 Vec3 DustReader::place_of(const Bone& body, VoxelKey own) {
-  const Ijk c = body.bone.coordinate(own);
-  return body.world_from_body(body.bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}));
+  return body.world_from_body(place_of_voxel_mm(body.bone, own));
 }
 
 // A region's voxel counts in the coarse grid too, whose density falls by as much.
 void DustReader::remove_from_coarse(const Bone& from, VoxelKey own, float density) {
   BrickGrid& coarse = bones_.begin()->second.bone;
-  const Ijk c = from.bone.coordinate(own);
-  const Vec3 x = coarse.frame().index_from_world(from.bone.frame().world_from_index({double(c.i), double(c.j), double(c.k)}));
-  const VoxelKey there =
-      coarse.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)), static_cast<int>(std::lround(x.z)));
+  const VoxelKey there = voxel_at(coarse, place_of_voxel_mm(from.bone, own));
   const double share = from.bone.frame().voxel_volume_mm3() / coarse.frame().voxel_volume_mm3();
   if (there != BrickGrid::kNone)
     coarse.set(there, std::clamp(coarse.value(there) - static_cast<float>(static_cast<double>(density) * share), 0.0F, 1.0F));
@@ -136,12 +142,9 @@ void DustReader::resync(const World& world) {
     for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
       if (bone.value(v) == d.bone.value(v)) continue;
       // What the coarse grid holds of a finer region is counted there.
-      const Vec3 at =
-          bone.frame().world_from_index({double(bone.coordinate(v).i), double(bone.coordinate(v).j), double(bone.coordinate(v).k)});
+      const Vec3 at = place_of_voxel_mm(bone, v);
       const bool of_region = !d.of_region && std::any_of(bones_.begin(), bones_.end(), [&](const auto& other) {
-        const Vec3 x = other.second.bone.frame().index_from_world(at);
-        return other.second.of_region && other.second.bone.find(static_cast<int>(std::lround(x.x)), static_cast<int>(std::lround(x.y)),
-                                                                static_cast<int>(std::lround(x.z))) != BrickGrid::kNone;
+        return other.second.of_region && voxel_at(other.second.bone, at) != BrickGrid::kNone;
       });
       if (!of_region) changes.push_back({v + d.first_brick * BrickGrid::kVoxels, bone.value(v)});
     }
