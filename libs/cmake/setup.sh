@@ -55,7 +55,7 @@ ensure_packages() {
     return
   fi
   for package in $(grep -v '^#' "$list"); do
-    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+    [[ $(dpkg-query -W -f '${Status}' "$package" 2>/dev/null) == *'ok installed'* ]] || missing+=("$package")
   done
   if [ ${#missing[@]} -gt 0 ]; then
     local sudo=

@@ -11,7 +11,8 @@
 set -euo pipefail
 file=$1 name=$2 bin=$3 fixtures=$4 source=$5
 PATH=$bin:$PATH
-line=$(grep -E "^$name *\|" "$file" | head -n 1)
+exec </dev/null
+line=$(grep -m 1 -E "^$name *\|" "$file")
 [ -n "$line" ] || { echo "no case '$name' in $file"; exit 1; }
 work=$(mktemp -d "${TMPDIR:-/tmp}/osteo-case-XXXXXX")
 trap 'chmod -R u+rwx "$work" 2>/dev/null; rm -rf "$work" "$work.state"' EXIT
@@ -38,6 +39,15 @@ nobody() {
   chmod a+rx . && setpriv --reuid=65534 --regid=65534 --clear-groups test -x "$(command -v osteo)" || exit 77
   setpriv --reuid=65534 --regid=65534 --clear-groups "$@"
 }
+# At the end of a pipe grep and head leave as soon as they know, and what still writes into it would fail: they read it out first.
+grep() { read_out grep "$@"; }
+head() { read_out head "$@"; }
+read_out() {
+  local code=0
+  command "$@" || code=$?
+  [ ! -p /dev/stdin ] || cat >/dev/null
+  return $code
+}
 hears_interrupt() { grep -qE '^SigCgt:.*[2367abef]$' "/proc/$1/status"; }
-export -f fails same value soon holds nobody hears_interrupt; export fixtures PATH
+export -f fails same value soon holds nobody hears_interrupt grep head read_out; export fixtures PATH
 eval "${line#*|}"
