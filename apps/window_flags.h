@@ -35,6 +35,9 @@ struct WindowFlags {
   bool dust = false;
   double rate_hz = 1000;
   std::string resume;
+  bool sound = true;
+  double volume = 0.7;
+  bool alarms = false;
   int width = 1360;
   int height = 860;
   std::string state_file;
@@ -55,6 +58,10 @@ struct WindowFlags {
     visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
+    visit({"sound", "in the window, what drilling sounds like (a model, docs/sound.md), on the machine's sound card where there is one"},
+          p.sound);
+    visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);
+    visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Drives the window under Xvfb and checks each effect. Waits for what it wants to see, never for a time.
 usage: drive_window.py keys|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
-import csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
+import array, csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
 
 part, bin_dir, work, source = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4])
 PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
@@ -133,9 +133,18 @@ def closed(session):
     return summary, replayed
 
 
+def loudness(raw, seconds):
+    """Of the last seconds that went to the sound card."""
+    samples = array.array("f")
+    data = pathlib.Path(raw).read_bytes()
+    samples.frombytes(data[: len(data) // 4 * 4][-int(seconds * 48000) * 4 :])
+    return math.sqrt(sum(x * x for x in samples) / max(1, len(samples)))
+
+
 def keys():
     make_case()
     pressed = set()
+    os.environ.update(SDL_AUDIODRIVER="disk", SDL_DISKAUDIOFILE="heard.raw")  # a sound card that writes what it would play
     with Screen():
         w = Window("--dust", "--diameter-mm", 6, "-o", "first")
 
@@ -177,6 +186,11 @@ def keys():
             if w.next()["removed_mm3"] > 2:
                 break
             w.x("click", 5 if w.state()["force_n"] > 2 else 4)
+        wait("the drill is heard", lambda: loudness("heard.raw", 0.05) > 0.003)
+        key("n", "sound off", lambda s: not s["sound"])
+        wait("silence", lambda: loudness("heard.raw", 0.1) == 0)
+        key("n", "sound on", lambda s: s["sound"])
+        wait("the drill is heard again", lambda: loudness("heard.raw", 0.05) > 0.003)
         w.x("mouseup", 1)
         assert w.until("drill off", lambda s: not s["drill_on"])["removed_mm3"] > 1
         for name, state in (("v", "sucking"), ("i", "washing")):

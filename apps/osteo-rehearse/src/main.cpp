@@ -106,7 +106,12 @@ void close_at_exit();
 class Sitting {
  public:
   Sitting(const WindowFlags& flags, const Case& the_case, cli::Invocation& io)
-      : case_(the_case), io_(io), hands_(flags), next_folder_(flags.out), last_(flags.resume) {
+      : case_(the_case),
+        io_(io),
+        hands_(flags),
+        next_folder_(flags.out),
+        last_(flags.resume),
+        sound_(flags.sound, flags.volume, flags.alarms) {
     options_.rate_hz = flags.rate_hz;
     options_.follow = {true, true, flags.dust};
     options_.haptics.params.contact.method = flags.contact;
@@ -114,6 +119,7 @@ class Sitting {
   }
 
   HandGoal begin(bool from_case, const HandView& view) {
+    sound_.follow(nullptr);
     rehearsal_.reset();
     if (!has_anatomy_) {  // the same for all sessions
       options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
@@ -137,10 +143,12 @@ class Sitting {
     try {
       rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
       rehearsal_->start();
+      sound_.follow(rehearsal_.get());
       // Registered again: what the servo has made for itself by now must outlive it.
       static_cast<void>(plate_library());
       std::atexit(close_at_exit);
     } catch (...) {
+      sound_.follow(nullptr);
       rehearsal_.reset();
       std::error_code ignored;  // nothing was recorded in it
       std::filesystem::remove_all(session_.folder, ignored);
@@ -152,6 +160,7 @@ class Sitting {
 
   void save() {
     if (!rehearsal_) return;
+    sound_.follow(nullptr);
     // Whatever comes of it, it is over; and what was recorded can be gone on from.
     const std::unique_ptr<Rehearsal> over = std::move(rehearsal_);
     last_ = session_.folder;
@@ -170,6 +179,7 @@ class Sitting {
 
   [[nodiscard]] Rehearsal* rehearsal() const { return rehearsal_.get(); }
   [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
+  [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] std::string device() const { return hands_.name(); }
   /// Of any session so far, ticks were not recorded.
   [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
@@ -182,6 +192,7 @@ class Sitting {
   RehearsalOptions options_;
   SessionFolder session_;
   std::unique_ptr<Rehearsal> rehearsal_;
+  SoundOut sound_;  // before the rehearsal it follows, it goes
   bool has_anatomy_ = false, lost_ticks_ = false;
 };
 
@@ -237,7 +248,7 @@ struct WindowCommand {
     g_sitting = &sitting;
     int gl_errors = 0;
     try {
-      gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions);
+      gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions, sitting.sound());
     } catch (...) {
       g_sitting = nullptr;
       sitting.save();

@@ -35,6 +35,7 @@ cli::Program make_osteo_program() {
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
   p.add<ExportCommand>();
+  p.add<SoundCommand>();
   p.add<DevicesCommand>();
   p.add<DoctorCommand>();
   p.add<DemoCommand>();

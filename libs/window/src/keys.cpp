@@ -53,6 +53,7 @@ constexpr Key kKeys[] = {
     {kF5, Command::save},
     {'R', Command::reset},
     {kHome, Command::home},
+    {'N', Command::sound},
     {kF1, Command::help},
     {'H', Command::help},
     {'Q', Command::quit},
@@ -98,6 +99,7 @@ const std::vector<HelpLine>& help_lines() {
                                               {"F5", "save the session and go on", {save}},
                                               {"R", "save the session, the bone is whole again", {reset}},
                                               {"Home", "view from the left", {home}},
+                                              {"N", "sound on and off", {sound}},
                                               {"F1, H", "shows this, and hides it", {help}},
                                               {"Q", "save and close", {quit}}};
   return lines;

@@ -34,6 +34,7 @@ enum class Command {
   save,
   reset,
   home,
+  sound,
   help,
   quit,
 };

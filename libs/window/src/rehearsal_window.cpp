@@ -41,6 +41,7 @@
 #include "rehearsal_control.h"
 #include "scene_tools.h"
 #include "settings_panel.h"
+#include "sound_panel.h"
 #include "status_panel.h"
 #include "window_state.h"
 
@@ -52,9 +53,10 @@ constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 
 class RehearsalWindow {
  public:
-  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions)
+  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
       : control_(actions, options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
         actions_(actions),
+        sound_(sound),
         scan_(options.scan),
         state_file_(options.state_file),
         device_name_(options.device) {
@@ -421,6 +423,7 @@ class RehearsalWindow {
     if (command == Command::screenshot) screenshot_wanted_ = true;
     if (command == Command::home) look_from(kFromLeft);
     if (command == Command::help) show_help_ = !show_help_;
+    if (command == Command::sound) sound_.turn(!sound_.on());
     if (command == Command::quit) quit_ = true;
   }
 
@@ -490,6 +493,7 @@ class RehearsalWindow {
     if (ImGui::Button("above")) look_from({0, -0.05, 1});
     ImGui::Separator();
     draw_status(rehearsal, tick);  // below the buttons, which its lines would move
+    draw_sound(sound_);
     draw_settings(rehearsal);
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
@@ -529,6 +533,7 @@ class RehearsalWindow {
     state.help = show_help_;
     state.sucking = control_.sucking();
     state.washing = control_.washing();
+    state.sound = sound_.on();
     state.hand = static_cast<int>(control_.tools().tool());
     state.cut = control_.tools().cut();
     state.plate = control_.tools().plate_grip();
@@ -553,6 +558,7 @@ class RehearsalWindow {
 
   RehearsalControl control_;
   WindowActions actions_;
+  SoundOut& sound_;
   VerdictSummary scan_;
   std::filesystem::path state_file_;
   GLFWwindow* window_ = nullptr;
@@ -573,8 +579,8 @@ class RehearsalWindow {
 
 }  // namespace
 
-int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions) {
-  return RehearsalWindow(options, hu, actions).run();
+int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound) {
+  return RehearsalWindow(options, hu, actions, sound).run();
 }
 
 }  // namespace osteo

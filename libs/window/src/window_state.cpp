@@ -28,6 +28,7 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"help", s.help},
                                  {"sucking", s.sucking},
                                  {"washing", s.washing},
+                                 {"sound", s.sound},
                                  {"hand", kHands[s.hand]},
                                  {"cut_at_mm", list(s.cut.at_mm)},
                                  {"cut_normal", list(s.cut.normal)},

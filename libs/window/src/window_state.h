@@ -14,7 +14,7 @@ struct WindowState {
   std::uint64_t pictures = 0;
   std::string failure, message, tool;
   std::filesystem::path session;
-  bool leading = false, drill_latched = false, help = false, sucking = false, washing = false;
+  bool leading = false, drill_latched = false, help = false, sucking = false, washing = false, sound = false;
   int hand = 0;  // SceneTools::Tool
   SawCut cut;
   RigidTransform plate;

@@ -9,6 +9,7 @@
 #include "osteo/data/sparse_grid.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/window/sound_out.h"
 
 namespace osteo {
 
@@ -48,7 +49,8 @@ struct WindowActions {
 /// Opens a window, begins a session, and runs until the window is closed; the session that runs then is the caller's to save. Returns the
 /// number of OpenGL errors seen (0 when all is well). What fails meanwhile is shown in the window, which offers to begin anew; what was not
 /// put right, or was lost, is thrown once the window is closed. Error(failed) when no window can be opened: then nothing was begun.
+/// `sound`: turned on and off, louder and softer in the window; whoever runs the rehearsal tells it which to follow.
 /// Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
-int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions);
+int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound);
 
 }  // namespace osteo
