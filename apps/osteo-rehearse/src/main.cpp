@@ -144,6 +144,10 @@ class Sitting {
       rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
       rehearsal_->start();
       sound_.follow(rehearsal_.get());
+      if (sound_.on() && !sound_.failure().empty() && !io_.common.quiet && !told_silence_) {
+        io_.err << sound_.failure() << "; --no-sound does not look for one" << std::endl;
+        told_silence_ = true;
+      }
       // Registered again: what the servo has made for itself by now must outlive it.
       static_cast<void>(plate_library());
       std::atexit(close_at_exit);
@@ -193,7 +197,7 @@ class Sitting {
   SessionFolder session_;
   std::unique_ptr<Rehearsal> rehearsal_;
   SoundOut sound_;  // before the rehearsal it follows, it goes
-  bool has_anatomy_ = false, lost_ticks_ = false;
+  bool has_anatomy_ = false, lost_ticks_ = false, told_silence_ = false;
 };
 
 void close_at_exit() {

@@ -1,13 +1,36 @@
 #include "osteo/window/audio_out.h"
 
 #include <SDL.h>
+#include <dlfcn.h>
 
 #include "osteo/base/error.h"
 #include "osteo/sound/synthesizer.h"
 
 namespace osteo {
+namespace {
+
+// While a card is looked for: where there is none, ALSA's library writes a dozen lines on standard error, and we say it in one.
+class QuietAlsa {
+ public:
+  using Handler = void (*)(const char* file, int line, const char* function, int error, const char* format, ...);
+  QuietAlsa() : set_(reinterpret_cast<int (*)(Handler)>(::dlsym(RTLD_DEFAULT, "snd_lib_error_set_handler"))) {
+    if (set_ != nullptr) set_(say_nothing);
+  }
+  ~QuietAlsa() {
+    if (set_ != nullptr) set_(nullptr);
+  }
+  QuietAlsa(const QuietAlsa&) = delete;
+  QuietAlsa& operator=(const QuietAlsa&) = delete;
+
+ private:
+  static void say_nothing(const char*, int, const char*, int, const char*, ...) {}
+  int (*set_)(Handler);
+};
+
+}  // namespace
 
 AudioOut::AudioOut(std::function<void(std::span<float>)> fill) : fill_(std::move(fill)) {
+  const QuietAlsa quiet;
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");  // Ctrl-C is ours
   SDL_SetHint(SDL_HINT_AUDIO_DEVICE_APP_NAME, "Osteotome");
   if (SDL_InitSubSystem(SDL_INIT_AUDIO) != 0) throw Error(ExitCode::failed, std::string("there is no sound: ") + SDL_GetError());

@@ -25,6 +25,8 @@ class SoundOut {
   void turn(bool on);
   void set_volume(double volume);
   void set_alarms(bool alarms);
+  /// Why no card could be opened; empty: one was, or none was looked for.
+  [[nodiscard]] const std::string& failure() const { return failure_; }
   /// For people: through what it plays, or why not.
   [[nodiscard]] std::string status() const;
 
