@@ -1,5 +1,7 @@
 #include "osteo/scene/surface_reader.h"
 
+#include <utility>
+
 #include "body_names.h"
 #include "osteo/base/files.h"
 
@@ -24,6 +26,7 @@ void SurfaceReader::resync(const World& world) {
     f.body = placed.body;
     if (is_new) {
       f.surface = std::make_unique<LiveSurface>(bone, context);
+      if (shaded_) f.surface->shade(context);
     } else {
       f.surface->rebind(bone);
     }
@@ -45,6 +48,22 @@ void SurfaceReader::update(Followed& f) {
 }
 void SurfaceReader::update() {
   for (auto& [id, f] : bodies_) update(f);
+}
+
+void SurfaceReader::shade() {
+  if (std::exchange(shaded_, true)) return;
+  Context context;
+  context.threads = threads_;
+  for (auto& [id, f] : bodies_) {
+    f.surface->shade(context);
+    for (std::uint32_t b = 0; b < f.surface->bone().brick_count(); ++b) f.changed_bricks.insert(f.changed_bricks.end(), b);
+  }
+}
+
+void SurfaceReader::settle() {
+  for (auto& [id, f] : bodies_) {
+    for (const std::uint32_t b : f.surface->settle()) f.changed_bricks.insert(b);
+  }
 }
 
 void SurfaceReader::scene_changed(const World& world, const World::Effect& effect) {

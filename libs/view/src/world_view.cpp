@@ -55,6 +55,15 @@ WorldView::~WorldView() {
 
 void WorldView::update(const World& world, SceneReaders& readers) {
   std::erase_if(bodies_, [&](const auto& b) { return world.find(b.first) == nullptr; });
+  if (readers.surface) {
+    // Normals a little way off a cut may follow a quarter of a second later.
+    constexpr std::chrono::milliseconds kSettle{250};
+    readers.surface->shade();
+    if (const auto now = std::chrono::steady_clock::now(); now >= settle_at_) {
+      readers.surface->settle();
+      settle_at_ = now + kSettle;
+    }
+  }
   for (const PlacedBody& placed : world.bodies()) {
     const std::uint32_t id = placed.body->id;
     const LiveSurface* const surface = readers.surface ? readers.surface->surface(id) : nullptr;

@@ -22,6 +22,11 @@ class SurfaceReader final : public Reader {
   void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
   void update() override;
 
+  /// From now on with normals to light by (LiveSurface::shade): whoever draws them asks for it. update() then takes half as long again.
+  void shade();
+  /// What update() left of those normals (LiveSurface::settle): now and then.
+  void settle();
+
   /// Null where there is no such body.
   [[nodiscard]] const LiveSurface* surface(std::uint32_t body) const;
   /// Bricks of a body whose surface is another since they were last asked for, ascending; bodies that were not there before, all.
@@ -40,6 +45,7 @@ class SurfaceReader final : public Reader {
   static void update(Followed& f);
 
   int threads_;
+  bool shaded_ = false;
   std::map<std::uint32_t, Followed> bodies_;  // by id: also their order in the world, but for regions
 };
 

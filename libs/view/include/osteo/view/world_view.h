@@ -56,6 +56,7 @@ class WorldView {
   std::vector<double> camera_;  // and poses, when last looked at
   std::chrono::steady_clock::time_point since_{};
   std::future<std::vector<Seen>> looking_;
+  std::chrono::steady_clock::time_point settle_at_;
   bool looked_ = false;
   std::size_t drawn_ = 0;
 };
