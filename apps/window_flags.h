@@ -35,6 +35,7 @@ struct WindowFlags {
   bool dust = false;
   double rate_hz = 1000;
   std::string resume;
+  bool require_approved = false;
   int width = 1360;
   int height = 860;
   std::string state_file;
@@ -55,6 +56,7 @@ struct WindowFlags {
     visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
+    visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);

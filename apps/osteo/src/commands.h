@@ -140,6 +140,7 @@ struct PrepareCommand {
     double spacing_mm = 0.5;
     Region region = Region::whole;
     bool remove_table = false;
+    bool keep_table = false;
     std::string structures;
     std::string names;
     std::string series;
@@ -155,7 +156,9 @@ struct PrepareCommand {
     visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
     visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
     visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);
-    visit({"remove_table", "clear table and head holder"}, p.remove_table);
+    visit({"remove_table", "clear table and head holder also where it is not certain that they are; what is certain goes without it"},
+          p.remove_table);
+    visit({"keep_table", "leave table and head holder on, however certain"}, p.keep_table);
     visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"}, p.structures);
     visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'; values without a name are left out"}, p.names);
     visit({"series",

@@ -129,6 +129,12 @@ bool withdraw_approval(const fs::path& folder) {
   return was;
 }
 
+void require_approval(const ApprovalNow& now, const fs::path& folder) {
+  if (now.state == ApprovalState::valid) return;
+  throw Error(ExitCode::failed, "'" + folder.string() + "': " + now.words() + ", and --require-approved was given",
+              "look at its report, then: osteo approve " + folder.string() + " --by NAME");
+}
+
 Json approval_json(const ApprovalNow& now) {
   constexpr const char* kStates[] = {"none", "valid", "outdated"};
   Json j{{"state", kStates[static_cast<int>(now.state)]}};

@@ -56,6 +56,8 @@ class RehearsalWindow {
       : control_(actions, options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
         actions_(actions),
         scan_(options.scan),
+        approval_(options.approval),
+        approval_ended_(options.approval_ended),
         state_file_(options.state_file),
         device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
@@ -500,6 +502,7 @@ class RehearsalWindow {
                 static_cast<double>(world_view_->triangles()) / 1e6);
     ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
+    draw_approval(approval_, approval_ended_);
     draw_scan(scan_);
     ImGui::TextWrapped("F1: mouse and keys");
     if (const std::string told = control_.told(); !told.empty()) {
@@ -554,6 +557,8 @@ class RehearsalWindow {
   RehearsalControl control_;
   WindowActions actions_;
   VerdictSummary scan_;
+  const std::string approval_;
+  const bool approval_ended_;
   std::filesystem::path state_file_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;

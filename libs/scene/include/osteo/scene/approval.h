@@ -40,6 +40,9 @@ void approve(const std::filesystem::path& case_folder, const std::string& by, co
 /// Whether there was one.
 bool withdraw_approval(const std::filesystem::path& case_folder);
 
+/// Error(failed) unless there is a valid one.
+void require_approval(const ApprovalNow& now, const std::filesystem::path& case_folder);
+
 /// For session.json: { "state": "valid", "by", "date", "note" }.
 [[nodiscard]] Json approval_json(const ApprovalNow& now);
 
