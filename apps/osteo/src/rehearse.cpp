@@ -339,7 +339,8 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << text;
   if (!io.common.quiet)
-    io.err << world.bodies().size() << " pieces and " << world.fixtures().size() << " plates: " << folder.string() << '\n';
+    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " piece and " : " pieces and ") << world.fixtures().size()
+           << (world.fixtures().size() == 1 ? " plate: " : " plates: ") << folder.string() << '\n';
   return 0;
 }
 

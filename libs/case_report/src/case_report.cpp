@@ -329,6 +329,22 @@ std::string case_code(const fs::path& folder) {
   return code;
 }
 
+std::vector<std::pair<std::string, std::string>> case_facts(const fs::path& folder) {
+  const CaseFacts f(folder);
+  const sheet::Band verdict = verdict_band(f);
+  Rows rows{{"Case", case_code(folder)}, {"Approval", approval_of(folder).words()}, {"Verdict", verdict.word + ": " + verdict.text}};
+  for (const Rows& more : {scan_rows(f), bone_rows(f), removed_rows(f)}) rows.insert(rows.end(), more.begin(), more.end());
+  if (const Json* const files = f.manifest().find("files")) {
+    std::string roles;
+    for (const auto& [role, file] : files->members()) roles += (roles.empty() ? "" : ", ") + role;
+    rows.emplace_back("Holds", roles);
+  }
+  const fs::path html = report_file(folder, ".html");
+  rows.emplace_back("Report", !output_exists(html) ? "none: osteo report " + folder.string()
+                                                   : html.string() + (report_shows(folder) ? "" : " (of an earlier state)"));
+  return rows;
+}
+
 bool report_shows(const fs::path& folder) {
   const std::string html = earlier_html(folder);
   return !html.empty() && mark_of_html(html, "state") == state_of(folder);

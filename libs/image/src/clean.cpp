@@ -104,6 +104,7 @@ std::vector<Hull> hulls_of(const std::vector<std::uint8_t>& core, const Frame& f
 
 Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& context) {
   constexpr float kThin = 3, kGrow = 5, kReach = (kThin + kGrow) * (kThin + kGrow);
+  constexpr float kCover = 2;
   constexpr double kSpeck_mm3 = 10;
   Outside result;
   Coarse c = coarse_matter(ct);
@@ -142,7 +143,9 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
       soft[parts.component[r]] += hu >= -150 && hu <= 150 ? 1 : 0;
     }
   }
-  const auto is_soft = [&](std::uint32_t part) { return 2 * soft[part] >= parts.voxels[part]; };
+  const auto is_soft = [&](std::uint32_t part, double share) {
+    return static_cast<double>(soft[part]) >= share * static_cast<double>(parts.voxels[part]);
+  };
   const auto of_parts = [&](const auto& chosen) {
     std::vector<std::uint8_t> map(n);
     for (std::size_t r = 0; r < parts.runs.size(); ++r) {
@@ -162,23 +165,24 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
     return !hulls[static_cast<std::size_t>(x[up])].holds(x[(up + 1) % 3], x[(up + 2) % 3]);
   };
   std::vector<std::uint64_t> beyond(pieces.voxels.size());
-  std::uint64_t outside = 0, all = 0;
+  std::uint64_t outside = 0, all = 0, covered = 0;  // voxels of the mask; covered: not outside, and with matter around them
   const auto look_around = [&](const std::vector<std::uint8_t>& body) {
     to_body = squared_distance_mm2(body, c.frame, 1, context);
     hulls = hulls_of(body, c.frame);
     std::fill(beyond.begin(), beyond.end(), 0);
-    outside = all = 0;
+    outside = all = covered = 0;
     each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t) {
       const bool is = is_outside(i, j, k);
       beyond[p] += is ? 1 : 0;
       outside += is ? 1 : 0;
+      covered += !is && to_air[coarse_at(i, j, k)] > kCover * kCover ? 1 : 0;
       ++all;
     });
   };
   std::uint32_t body_part = 0;
-  if (!parts.voxels.empty() && is_soft(body_part = largest_of(parts))) {
+  if (!parts.voxels.empty() && is_soft(body_part = largest_of(parts), 0.5)) {
     look_around(of_parts([&](std::uint32_t part) { return part == body_part; }));
-    result.body = 3 * outside <= all;
+    result.body = 3 * outside <= 2 * all && 10 * covered >= 7 * (all - outside);
   }
   if (!result.body) {
     const std::uint32_t skull = largest_of(pieces);
@@ -192,7 +196,10 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
 
   std::vector<float> to_limb;
   if (result.body)
-    to_limb = squared_distance_mm2(of_parts([&](std::uint32_t part) { return part != body_part && is_soft(part); }), c.frame, 1, context);
+    to_limb = squared_distance_mm2(of_parts([&](std::uint32_t part) {
+                                     return part != body_part && is_soft(part, 0.25);  // a wrist is half bone
+                                   }),
+                                   c.frame, 1, context);
   std::vector<std::uint8_t> limb(pieces.voxels.size());
   std::vector<float> nearest(pieces.voxels.size(), std::numeric_limits<float>::infinity());
   each_voxel([&](std::uint32_t p, int i, int j, int k, std::size_t) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/base/context.h"
@@ -34,6 +35,10 @@ CaseReport write_case_report(const std::filesystem::path& case_folder, const std
 
 /// Whether the report that is there shows the case as it is.
 [[nodiscard]] bool report_shows(const std::filesystem::path& case_folder);
+
+/// Names and values of what a person wants to know of a case: its code, verdict, scan, bone, what was taken off, approval, report. A row without a
+/// name goes on with the one before.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> case_facts(const std::filesystem::path& case_folder);
 
 /// A short name that can be said and says nothing: two words of five letters, for the first 32 bits of the hash of the scan (of the bone
 /// where the case knows no scan). D. Wilkerson, A proposal for proquints, arXiv:0901.4016.
