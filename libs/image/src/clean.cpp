@@ -182,7 +182,7 @@ Outside find_outside(const std::uint8_t* mask, const Image& ct, const Context& c
   std::uint32_t body_part = 0;
   if (!parts.voxels.empty() && is_soft(body_part = largest_of(parts), 0.5)) {
     look_around(of_parts([&](std::uint32_t part) { return part == body_part; }));
-    result.body = 3 * outside <= 2 * all && 10 * covered >= 7 * (all - outside);
+    result.body = 3 * outside <= 2 * all && 20 * covered >= 17 * (all - outside);
   }
   if (!result.body) {
     const std::uint32_t skull = largest_of(pieces);

@@ -11,7 +11,7 @@ namespace osteo::image {
 /// Table, head holder, wires: what lies outside the body.
 ///
 /// The body is the largest piece of matter (above -300 HU) that stays connected when everything thinner than 6 mm is taken away, grown back
-/// by 5 mm; it has to be soft tissue for at least a half (-150 to 150 HU), to hold a third of the mask, and to cover it: seven tenths of
+/// by 5 mm; it has to be soft tissue for at least a half (-150 to 150 HU), to hold a third of the mask, and to cover it: 0.85 of
 /// the mask within lie 2 mm deep or more (0.95 to 0.99 of heads, 0.2 of a skull phantom filled with resin). Outside is what is farther
 /// than that from it and also outside its convex hull in the slice: cells and thin walls in air (nose, sinuses, mastoid) lie within the
 /// hull. Without such a body (a dry skull) the hull is that of the largest piece of the mask, and nothing is certain.
