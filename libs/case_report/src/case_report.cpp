@@ -33,7 +33,8 @@ std::string state_of(const fs::path& folder) {
 
 std::string earlier_html(const fs::path& folder) {
   const fs::path html = report_file(folder, ".html");
-  return output_exists(html) ? read_text(html) : std::string();
+  std::error_code ec;
+  return fs::is_regular_file(html, ec) ? read_text(html) : std::string();
 }
 
 // Outward, of the triangles around, where the file has none.
@@ -114,7 +115,7 @@ void add_row(Sheet& s, const Pictures& pictures, double height_mm, const std::ve
 sheet::Table structure_table(const std::vector<StructureMeasure>& measures) {
   sheet::Table t;
   t.head = {"structure", "volume", "pieces", "length", "nearest to it", "usual", ""};
-  t.widths = {20, 11, 11, 9, 26, 30, 15};
+  t.widths = {18, 12, 10, 11, 25, 30, 17};
   const auto name_of = [&](std::uint8_t value) {
     for (const auto& m : measures) {
       if (m.structure.value == value) return m.structure.name;
@@ -247,7 +248,7 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
         " % of it); yellow 1 mm; pale 2 mm and more. Bone thinner than a voxel of the scan is too thin or missing here."}});
   small.push_back({resolution_table(f)});
   small.push_back({sheet::Paragraph{
-      "Sizes are of adults (docs/phantom.md). Two voxels across are the least by which a structure is seen everywhere.", Tone::quiet}});
+      "Sizes are of adults, from textbooks. Two voxels across are the least by which a structure is seen everywhere.", Tone::quiet}});
   for (const auto& note : verdict_notes(f)) small.push_back({note});
   s.blocks.push_back({sheet::Columns{{thin, small}, {}}});
 
@@ -294,7 +295,8 @@ Sheet sheet_of(const fs::path& folder, const Content& c, const std::string& aske
 }
 
 bool write_if_other(const fs::path& path, const std::string& text) {
-  if (output_exists(path) && read_text(path) == text) return false;
+  std::error_code ec;
+  if (fs::is_regular_file(path, ec) && read_text(path) == text) return false;
   write_file(path, text);
   return true;
 }

@@ -188,7 +188,7 @@ struct Usual {
   const char* source;
 };
 
-constexpr const char* kTextbook = "textbook anatomy (docs/phantom.md)";
+constexpr const char* kTextbook = "textbook anatomy";
 
 const std::vector<Usual>& usual() {
   // In this order: "facial nerve" before "nerve". Ranges are wide: what lies outside is worth a look, not wrong.

@@ -243,7 +243,8 @@ void draw_thin(const Subject& s, std::span<const float> below, Pictures& into) {
   }
   const Vec3 size = s.hi_mm - s.lo_mm, centre = (s.lo_mm + s.hi_mm) * 0.5;
   constexpr int kPixels = 440;
-  const double mm_per_pixel = 1.04 * std::max({size.x, size.y, size.z, 1.0}) / kPixels;
+  // From the corner the box is as wide as its diagonal.
+  const double mm_per_pixel = 1.02 * std::max({std::hypot(size.x, size.y), size.z + 0.25 * std::hypot(size.x, size.y), 1.0}) / kPixels;
   constexpr std::array<ViewFrom, 2> kSides{ViewFrom::left_front, ViewFrom::below};
   std::vector<Picture> pictures = draw_sides(*s.surface, kSides, centre, mm_per_pixel, kPixels, kPixels, rgb);
   into["thin-left-front"] = std::move(pictures[0]);

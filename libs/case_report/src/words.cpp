@@ -102,8 +102,10 @@ sheet::Band verdict_band(const CaseFacts& f) {
       if (first.empty()) first = text(e.find("message"));
     }
   }
-  if (status == "good")
+  if (status == "good" && text(f.verdict("source")) == "DICOM")
     return {"Good", "Every slice was taken as the scanner stored it; nothing was guessed, moved or left out.", Tone::good};
+  if (status == "good")
+    return {"Good", "Values and places are as the file has them; what was done to the scan before is not known.", Tone::good};
   if (status == "repaired") {
     std::string said = first.empty() ? "Slices were resampled onto upright, even ones." : first;
     if (warnings > 1) said += " And " + std::to_string(warnings - 1) + (warnings == 2 ? " more note, below." : " more notes, below.");

@@ -222,11 +222,11 @@ std::string style_of(double scale) {
        "header{display:flex;justify-content:space-between;border-bottom:.12rem solid #1a406b;margin-bottom:.7rem}\n"
        "h1{font-size:1.85rem;margin:0;color:#1a406b}header b{font-size:1.85rem}\n"
        "h2{font-size:1.19rem;margin:.7rem 0 .25rem;color:#1a406b;break-after:avoid}\n"
-       "p{margin:0 0 .5rem}figure{margin:0}img{display:block;width:100%;height:auto}\n"
+       "p{margin:0 0 .5rem}figure{margin:0;min-width:0}img{display:block;width:100%;height:auto}\n"
        "figcaption{font-size:.82rem;color:"
     << css(ink(Tone::quiet))
     << "}\n"
-       ".pictures{display:flex;flex-wrap:wrap;gap:.28rem;margin-bottom:.5rem;break-inside:avoid}\n"
+       ".pictures{display:flex;gap:.28rem;margin-bottom:.5rem;break-inside:avoid}\n"
        ".columns{display:flex;gap:1.15rem;margin-bottom:.3rem}.columns>*{flex:1;min-width:0}\n"
        "dl{display:grid;grid-template-columns:30% 1fr;gap:.14rem .4rem;margin:0 0 .3rem;font-size:.96rem;align-content:start}\n"
        "dt{color:"

@@ -240,7 +240,7 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
         const double width = i.picture.height > 0 ? real * i.picture.width / i.picture.height : real;
         pen.picture(i.picture, at, y, width, real);
         if (!i.caption.empty())
-          caption = std::max(caption, pen.text(i.caption, at, y + real + 0.8, width, {kTextPt - 1.4, false, ink(Tone::quiet)}));
+          caption = std::max(caption, pen.text(i.caption, at, y + real + 0.8, width - gap, {kTextPt - 1.4, false, ink(Tone::quiet)}));
         at += width + gap;
       }
       return real + (caption > 0 ? caption + 1.2 : 0);
