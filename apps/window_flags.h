@@ -38,6 +38,7 @@ struct WindowFlags {
   bool sound = true;
   double volume = 0.7;
   bool alarms = false;
+  bool require_approved = false;
   int width = 1360;
   int height = 860;
   std::string state_file;
@@ -62,6 +63,7 @@ struct WindowFlags {
           p.sound);
     visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);
     visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
+    visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);

@@ -15,6 +15,7 @@ find_package(DCMTK CONFIG REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5)
 pkg_check_modules(HIDAPI REQUIRED IMPORTED_TARGET hidapi-hidraw)
+pkg_check_modules(PANGOCAIRO REQUIRED IMPORTED_TARGET pangocairo cairo-pdf)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 list(APPEND CMAKE_MODULE_PATH ${CMAKE_SYSTEM_PREFIX_PATH})
 # Debian keeps OpenVDB's find module below the library folder.

@@ -12,6 +12,7 @@
 #include "osteo/cli/command.h"
 #include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
+#include "osteo/scene/approval.h"
 #include "osteo/scene/free_ways.h"
 #include "osteo/scene/session_folder.h"
 #include "osteo/window/rehearsal_window.h"
@@ -228,6 +229,8 @@ struct WindowCommand {
 
   static int run(const Params& p, cli::Invocation& io) {
     const Case the_case = load_case(io.arguments[0]);
+    const ApprovalNow approval = approval_of(the_case.folder);
+    if (p.require_approved) require_approval(approval, the_case.folder);
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
     WindowOptions window;
@@ -237,6 +240,8 @@ struct WindowCommand {
     window.width = p.width;
     window.height = p.height;
     window.state_file = p.state_file;
+    window.approval = approval.words();
+    window.approval_ended = approval.state == ApprovalState::outdated;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));
     Sitting sitting(p, the_case, io);
     window.device = sitting.device();

@@ -157,6 +157,7 @@ struct PrepareCommand {
     double spacing_mm = 0.5;
     Region region = Region::whole;
     bool remove_table = false;
+    bool keep_table = false;
     std::string structures;
     std::string names;
     std::string series;
@@ -164,6 +165,7 @@ struct PrepareCommand {
     double hu_offset = 0;
     std::string pipeline;
     bool fresh = false;
+    bool no_report = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"out", "folder of the case, made when it is not there (also -o)"}, p.out);
@@ -171,7 +173,9 @@ struct PrepareCommand {
     visit({"lower", "bone threshold", "HU", -1024, 30000}, p.lower);
     visit({"spacing_mm", "edge of the voxels", "mm", 0.05, 10}, p.spacing_mm);
     visit({"region", "part of the head to keep; 'osteo crop' tells more"}, p.region);
-    visit({"remove_table", "clear table and head holder"}, p.remove_table);
+    visit({"remove_table", "clear table and head holder also where it is not certain that they are; what is certain goes without it"},
+          p.remove_table);
+    visit({"keep_table", "leave table and head holder on, however certain"}, p.keep_table);
     visit({"structures", "label map of nerves, vessels, ... (.seg.nrrd, .nii.gz, .dcm) that belongs to the CT"}, p.structures);
     visit({"names", "what its values stand for, like '1=facial nerve, 2=sigmoid sinus'; values without a name are left out"}, p.names);
     visit({"series",
@@ -182,6 +186,33 @@ struct PrepareCommand {
     visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
     visit({"fresh", "forget the flags that the case remembers: only those given now count"}, p.fresh);
+    visit({"no_report", "write no report beside the case: its cuts are pictures of the patient"}, p.no_report);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct ReportCommand {
+  struct Params {
+    std::string scan;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"scan", "the scan that the case was made from, when it is not where it was (empty: as this machine remembers)"}, p.scan);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct ApproveCommand {
+  struct Params {
+    std::string by;
+    std::string note;
+    bool withdraw = false;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"by", "name of the person who has looked at the case; kept in the case and in each session"}, p.by);
+    visit({"note", "what that person has to say"}, p.note);
+    visit({"withdraw", "take the approval back"}, p.withdraw);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
 #include "osteo/dicom/objects.h"
 #include "osteo/pipeline/formats.h"
 #include "osteo/pipeline/pipeline.h"
@@ -53,6 +54,7 @@ int ConvertCommand::run(const Params& p, cli::Invocation& io) {
     }
   }
   io.end_progress();
+  if (io.common.json) io.out << Json{{"kind", kind_name(kind_of(data))}, {"output", to.string()}}.dump(2) << '\n';
   if (!io.common.quiet) io.err << kind_name(kind_of(data)) << " -> " << to.string() << '\n';
   return 0;
 }

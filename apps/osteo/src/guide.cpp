@@ -78,9 +78,9 @@ int GuideCommand::run(const Params& p, cli::Invocation& io) {
   if (io.common.json) {
     Json j{{"soft_tissue_hu", g.soft_tissue_hu}, {"noise_hu", g.noise_hu}, {"dense_bone_hu", g.dense_bone_hu},
            {"confidence", g.confidence},         {"doubt", g.doubt},       {"presets", Json::object()}};
-    for (const PresetGuide& p : g.presets) {
-      j["presets"][std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(p.preset)])] = {
-          {"lower_hu", p.lower_hu}, {"volume_mm3", p.volume_mm3}, {"change_percent_per_50_hu", p.change_percent}};
+    for (const PresetGuide& each : g.presets) {
+      j["presets"][std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)])] = {
+          {"lower_hu", each.lower_hu}, {"volume_mm3", each.volume_mm3}, {"change_percent_per_50_hu", each.change_percent}};
     }
     io.out << j.dump(2) << '\n';
     return 0;
@@ -96,11 +96,11 @@ int GuideCommand::run(const Params& p, cli::Invocation& io) {
   static constexpr const char* kFor[] = {"skull vault, jaw, long bones", "mastoid air cells, cancellous bone",
                                          "orbit, sinus walls, tegmen"};
   for (std::size_t n = 0; n < g.presets.size(); ++n) {
-    const PresetGuide& p = g.presets[n];
+    const PresetGuide& each = g.presets[n];
     char line[160];
     std::snprintf(line, sizeof line, "%-10s %-9.0f %-11.1f %-18s %s\n",
-                  std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(p.preset)]).c_str(), p.lower_hu, p.volume_mm3 / 1000,
-                  (std::to_string(r(p.change_percent)) + " %").c_str(), kFor[n]);
+                  std::string(EnumNames<BonePreset>::values[static_cast<std::size_t>(each.preset)]).c_str(), each.lower_hu,
+                  each.volume_mm3 / 1000, (std::to_string(r(each.change_percent)) + " %").c_str(), kFor[n]);
     io.out << line;
   }
   if (!g.doubt.empty()) return 0;

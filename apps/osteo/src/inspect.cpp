@@ -8,9 +8,11 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
+#include "osteo/case_report/case_report.h"
 #include "osteo/dicom/scan.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/pipeline/formats.h"
+#include "osteo/scene/approval.h"
 #include "osteo/tets/quality.h"
 
 namespace osteo {
@@ -83,6 +85,20 @@ void describe_data(Json& j, const Data& data) {
   }
 }
 
+// A value with the digits that mean something; lists as "1, 2, 3".
+std::string plain_text(const Json& value) {
+  if (value.text() != nullptr) return *value.text();
+  if (!value.items().empty()) {
+    std::string all;
+    for (const Json& v : value.items()) all += (all.empty() ? "" : v.items().empty() ? ", " : "; ") + plain_text(v);
+    return all;
+  }
+  const auto number = value.number();
+  if (!number || *number == 0 || *number == std::round(*number)) return value.dump();
+  const double scale = std::pow(10, 5 - std::floor(std::log10(std::abs(*number))));
+  return format_number(std::round(*number * scale) / scale);
+}
+
 // JSON as indented lines for people.
 void print_plain(std::ostream& out, const Json& j, const std::string& indent = "") {
   for (const auto& [key, value] : j.members()) {
@@ -90,7 +106,7 @@ void print_plain(std::ostream& out, const Json& j, const std::string& indent = "
       out << indent << key << ":\n";
       print_plain(out, value, indent + "  ");
     } else {
-      out << indent << key << ": " << (value.text() != nullptr ? *value.text() : value.dump()) << '\n';
+      out << indent << key << ": " << plain_text(value) << '\n';
     }
   }
 }
@@ -125,7 +141,9 @@ int ListCommand::run(const Params&, cli::Invocation& io) {
 cli::CommandInfo InfoCommand::info() {
   return {"info",
           "facts on any file that can be read",
-          "Kind, frame, range of values, volume, closedness: whatever applies. A folder is taken for DICOM.",
+          "Kind, frame, range of values, volume, closedness: whatever applies. Of a case what a person wants to know, approval included; "
+          "--json prints "
+          "its manifest. Another folder is taken for DICOM.",
           {{"file", "volume, grid, surface, picture, or DICOM folder"}},
           "osteo info bone.vdb"};
 }
@@ -139,6 +157,13 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
     const auto manifest = Json::parse(read_text(path / "manifest.json"));
     if (!manifest) throw Error(ExitCode::corrupt, "'" + (path / "manifest.json").string() + "' is damaged", "run 'osteo prepare' again");
     j = *manifest;
+    j["code"] = case_code(path);
+    j["approval"] = approval_json(approval_of(path));
+    if (!io.common.json) {
+      for (const auto& [name, value] : case_facts(path))
+        io.out << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << value << '\n';
+      return 0;
+    }
   } else {
     static constexpr std::array kAny{DataKind::image,   DataKind::labels, DataKind::grid,
                                      DataKind::surface, DataKind::tets,   DataKind::picture};

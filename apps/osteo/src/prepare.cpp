@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "case_pipeline.h"
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -23,19 +24,6 @@ struct Input {
 Input input_of(const std::string& named) {
   require_readable(named);
   return {named, hash_path(named)};
-}
-
-// A threshold that was asked for is where the boundary of bone lies; resample need not guess it from the mask.
-void pass_threshold_on(Pipeline& pipeline) {
-  for (PipelineNode& bone : pipeline.nodes) {
-    const auto mask = bone.inputs.find("mask");
-    if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
-    for (const PipelineNode& n : pipeline.nodes) {
-      if (n.id != mask->second.node || n.stage != "threshold" || !n.params.contains("lower")) continue;
-      const auto preset = n.params.find("preset");
-      if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
-    }
-  }
 }
 
 // The scan of the case as it is now and as it is going to be, where its verdicts know both.
@@ -66,24 +54,12 @@ void set_aside_stale_files(const fs::path& folder, const std::map<std::string, M
   }
 }
 
-std::string quoted(const std::string& text) {
-  return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
-}
-
-// As it is written on a command line: --lower 500, --set keep_largest=1, --remove-table.
-std::string flag_of(const std::string& name, const std::string& value, const std::vector<FieldRef>& fields) {
-  for (const FieldRef& f : fields) {
-    if (f.doc.name != name) continue;
-    if (f.kind() != "flag") return f.flag() + " " + quoted(value);
-    return value == "true" ? f.flag() : "--no-" + f.flag().substr(2);
-  }
-  return "--set " + name + "=" + quoted(value);
-}
-
 // What is asked for now, by variable; none where a setting is dropped.
 std::map<std::string, std::optional<std::string>> given_now(const std::vector<FieldRef>& fields, const cli::Invocation& io) {
   std::map<std::string, std::optional<std::string>> given;
-  const auto own = [](const std::string& name) { return name == "out" || name == "pipeline" || name == "structures" || name == "fresh"; };
+  const auto own = [](const std::string& name) {
+    return name == "out" || name == "pipeline" || name == "structures" || name == "fresh" || name == "no_report";
+  };
   for (const FieldRef& f : fields) {
     const std::string name(f.doc.name), value = f.to_text();
     if (!io.given.contains(name) || own(name)) continue;
@@ -111,7 +87,10 @@ cli::CommandInfo PrepareCommand::info() {
       "Runs the pipeline temporal-bone.json: import, crop, threshold, resample, surface, preview; writes a manifest. Run again, it keeps "
       "what is unchanged, and the case remembers the flags that made it: only what is given again changes, and it says what from and to. "
       "--fresh forgets them all, --no-structures (or another of the text flags) or an empty --set NAME= drops one. Until the new state is "
-      "whole the case stays as it was. Variables of the pipeline are also set with --set NAME=VALUE.",
+      "whole the case stays as it was. Variables of the pipeline are also set with --set NAME=VALUE. Beside the case, not in it, a report "
+      "to "
+      "look at and print is written: CASE.report.html and CASE.report.pdf. Its cuts are pictures of the patient; --no-report leaves it "
+      "out.",
       {{"source",
         "DICOM folder, DICOMDIR or zip, or a volume file (.nrrd .nii.gz .mha .vti); may be left out when the case was made on this "
         "machine",
@@ -150,6 +129,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
                 "give all its flags again, with --fresh");
   }
   std::map<std::string, ManifestFile> files_before;  // of a case of another scan
+  std::optional<CaseReport> report;
   const auto files_of_case = [&]() -> std::map<std::string, ManifestFile> {
     try {
       return parse_manifest(read_text(folder / "manifest.json"));
@@ -261,30 +241,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (names_file || value.find('/') != std::string::npos || without_uid(value) != value) recipe.withheld.insert(name);
   }
 
-  std::map<std::string, std::string> settings = recipe.settings;
-  settings.erase("names");
-  settings["source"] = source.path.string();
-  settings["case"] = folder.string();
-  Pipeline pipeline = parse_pipeline(text, settings);
+  Pipeline pipeline = case_pipeline(text, recipe, source.path, structures.path, as_the_case_holds_them, folder);
   const std::string name = pipeline.name;
-  if (!structures.path.empty()) {
-    PipelineNode node;
-    node.id = node.stage = "structures";
-    node.inputs["labels"].file = structures.path;
-    const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
-    if (has_ct) node.inputs["image"].node = "ct";
-    const auto names = recipe.settings.find("names");
-    if (names != recipe.settings.end() && !as_the_case_holds_them) {
-      node.params["names"] = names->second;
-      node.params["only_named"] = "true";
-    }
-    node.outputs["structures"] = folder / "structures.seg.nrrd";
-    pipeline.nodes.push_back(std::move(node));
-    for (PipelineNode& n : pipeline.nodes) {
-      if (n.id == "preview") n.inputs["mask"].node = "structures";
-    }
-  }
-  pass_threshold_on(pipeline);
   validate(pipeline, io.registry);
 
   // What lies in the folder that is not ours is never replaced.
@@ -319,10 +277,14 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (!kept.empty()) io.context.info("kept:" + kept + "   (--fresh forgets all, --no-structures and the like drop one)");
   }
 
+  const Pipeline as_run = pipeline;
+  ScanKeeper keeper(as_run);
+  const std::string asked_for = flags_of(recipe);
   try {
-    auto results = run_pipeline(
-        std::move(pipeline), io.registry,
-        {.overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }}, io.context);
+    RunOptions options{
+        .overwrite = io.common.force, .reuse = !io.common.force, .place = [&](const fs::path& o) { return update.place(o); }};
+    if (!p.no_report) options.seen = keeper.sink();
+    auto results = run_pipeline(std::move(pipeline), io.registry, options, io.context);
     recall_facts(folder, results);
     if (another_scan(update)) {
       if (!io.common.force) {
@@ -339,6 +301,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     for (const std::string& setting : recipe.withheld) remember(hash_text(recipe.settings.at(setting)), recipe.settings.at(setting));
     io.end_progress();
     cli::print_results(results, io);
+    // The case is whole by now, whatever becomes of its report.
+    if (!p.no_report) report = report_on(folder, asked_for, as_run, keeper.take(), io);
   } catch (const ErrorWithDocument&) {
     // The verdict on a refused scan stays, where there is no case yet.
     const fs::path verdict = folder / "import.json";
@@ -355,8 +319,12 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     throw;
   }
   if (!io.common.quiet) {
-    io.err << "case: " << folder.string() << "  (peak memory " << std::lround(peak_memory_mb()) << " MB)\n  look at "
-           << (folder / "preview.png").string() << "\n  then: osteo rehearse " << folder.string() << '\n';
+    io.err << "case: " << folder.string() << "  " << case_code(folder) << "  (peak memory " << std::lround(peak_memory_mb()) << " MB)\n";
+    if (report) {
+      io.err << "  look at " << report->html.string() << "\n  then: osteo approve " << folder.string() << " --by NAME\n";
+    } else {
+      io.err << "  look at " << (folder / "preview.png").string() << "\n  then: osteo rehearse " << folder.string() << '\n';
+    }
   }
   return 0;
 }

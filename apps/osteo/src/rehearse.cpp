@@ -16,6 +16,7 @@
 #include "osteo/cli/report.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
+#include "osteo/scene/approval.h"
 #include "osteo/scene/case.h"
 #include "osteo/scene/plan.h"
 #include "osteo/scene/rehearsal.h"
@@ -103,6 +104,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (!p.headless) return open_window(p, io);
   const Case the_case = load_case(io.arguments[0]);
+  const ApprovalNow approval = approval_of(the_case.folder);
+  if (p.require_approved) require_approval(approval, the_case.folder);
   io.context.progress(0, "loading");
   RehearsalOptions options;
   options.haptics.params.contact.method = p.contact;
@@ -189,7 +192,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   save_surface(after, folder / "surface.ply");
   io.end_progress();
   if (!io.common.quiet) {
-    io.err << told_hardness(options.anatomy) << '\n';
+    io.err << "case: " << approval.words() << '\n' << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
     if (s.ticks_not_followed > 0)
       io.err << "surface, pieces and dust missed " << s.ticks_not_followed
@@ -246,12 +249,14 @@ int ReplayCommand::run(const Params& p, cli::Invocation& io) {
          {"dust_hash", r.dust_hash}, {"removed_mm3", r.removed_mm3},
          {"seconds", r.seconds}};
   if (anatomy.structures) j["structures"] = Json::parse(structures_json(r.structures, *anatomy.structures, outline.header.rate_hz)).value();
+  if (!folder.approval.empty()) j["approval"] = folder.approval;
   if (!r.difference.empty()) j["difference"] = r.difference;
   if (r.difference_since_s) j["same_until_s"] = *r.difference_since_s;
   if (io.common.json) io.out << j.dump(2) << '\n';
   // Losses are told even when quiet: they are no talk.
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   for (const std::string& line : outline.newer) io.err << "session: of a later version, left out: " << line << '\n';
+  if (!folder.approval.empty() && !io.common.quiet) io.err << "case, when it was recorded: " << folder.approval << '\n';
   const bool whole = outline.gaps.empty();
   if (!whole) {
     io.err << "only the first " << r.ticks_repeated << " of " << r.ticks << " ticks could be run again; "
@@ -386,7 +391,8 @@ int PlanCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (io.common.json) io.out << text;
   if (!io.common.quiet)
-    io.err << world.bodies().size() << " pieces and " << world.fixtures().size() << " plates: " << folder.string() << '\n';
+    io.err << world.bodies().size() << (world.bodies().size() == 1 ? " piece and " : " pieces and ") << world.fixtures().size()
+           << (world.fixtures().size() == 1 ? " plate: " : " plates: ") << folder.string() << '\n';
   return 0;
 }
 

@@ -25,31 +25,95 @@ std::string short_text(const ReportValue& value) {
   return std::get<std::string>(value);
 }
 
-std::pair<std::string, std::string> fact_text(const std::string& key, const ReportValue& value) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kUnits{{{"_mm3", "mm3"},
-                                                                                         {"_mm2", "mm2"},
-                                                                                         {"_mm", "mm"},
-                                                                                         {"_hu", "HU"},
-                                                                                         {"_deg", "degrees"},
-                                                                                         {"_percent", "%"},
-                                                                                         {"_mb", "MB"},
-                                                                                         {"_ms", "ms"},
-                                                                                         {"_s", "s"},
-                                                                                         {"_n", "N"},
-                                                                                         {"_kpa", "kPa"},
-                                                                                         {" mm3", "mm3"},
-                                                                                         {"_max_voxels", "voxels, the most"},
-                                                                                         {"_mean_voxels", "voxels on average"}}};
-  std::string name = key, text = short_text(value);
-  if (!std::holds_alternative<bool>(value) && !std::holds_alternative<std::string>(value)) {
-    for (const auto& [ending, unit] : kUnits) {
-      if (!name.ends_with(ending) || name.size() == ending.size()) continue;
-      name.resize(name.size() - ending.size());
-      text.append(" ").append(unit);
-      break;
+namespace {
+
+// At most so many decimals; what would be shown as none of it, though it is not, keeps two digits that mean something.
+std::string decimals(double v, int places) {
+  const double scale = std::pow(10, places), rounded = std::round(v * scale) / scale;
+  if (v == 0 || std::abs(v) * scale >= 10) return format_number(rounded == 0 ? 0 : rounded);
+  const double two = std::pow(10, 1 - std::floor(std::log10(std::abs(v))));
+  return format_number(std::round(v * two) / two);
+}
+// Four digits that mean something, at most.
+std::string four(double v) {
+  return short_text(v);
+}
+std::string large(double v, const char* small_unit, const char* large_unit, double ratio) {
+  return std::abs(v) < ratio ? four(v) + " " + small_unit : four(v / ratio) + " " + large_unit;
+}
+
+// A number with the digits and the unit that the ending of its name asks for; the ending goes.
+bool with_unit(std::string& name, double v, std::string& text) {
+  const auto ends = [&](std::string_view ending) {
+    if (!name.ends_with(ending) || name.size() == ending.size()) return false;
+    name.resize(name.size() - ending.size());
+    return true;
+  };
+  if (ends("_mm3") || ends(" mm3")) {
+    text = large(v, "mm3", "cm3", 1000);
+  } else if (ends("_mm2")) {
+    text = large(v, "mm2", "cm2", 100);
+  } else if (ends("_mm")) {
+    text = decimals(v, 2) + " mm";
+  } else if (ends("_hu")) {
+    text = std::abs(v) < 10 ? decimals(v, 1) + " HU" : format_number(std::round(v)) + " HU";
+  } else if (ends("_deg")) {
+    text = decimals(v, 1) + " degrees";
+  } else if (ends("_percent")) {
+    text = v != 0 && std::abs(v) < 0.05 ? "less than 0.1 %" : decimals(v, 1) + " %";
+  } else if (ends("_mb")) {
+    text = decimals(v, std::abs(v) < 10 ? 1 : 0) + " MB";
+  } else if (ends("_max_voxels")) {
+    text = four(v) + " voxels, the most";
+  } else if (ends("_mean_voxels")) {
+    text = four(v) + " voxels on average";
+  } else {
+    for (const auto& [ending, unit] : {std::pair{"_ms", "ms"}, std::pair{"_s", "s"}, std::pair{"_n", "N"}, std::pair{"_kpa", "kPa"}}) {
+      if (!ends(ending)) continue;
+      text = four(v) + " " + unit;
+      return true;
     }
+    return false;
   }
+  return true;
+}
+
+// What imaging staff call it, where the name of the fact is not that.
+constexpr std::array<std::array<std::string_view, 3>, 19> kWords{{{"source_kind", "source", ""},
+                                                                  {"slice_gap_min_mm", "least distance of slices", ""},
+                                                                  {"slice_gap_max_mm", "greatest distance of slices", ""},
+                                                                  {"position_error_mm", "a pixel is out of place by", ""},
+                                                                  {"axes", "axes of the voxels point to", ""},
+                                                                  {"hu_min", "lowest value", "HU"},
+                                                                  {"hu_max", "highest value", "HU"},
+                                                                  {"looks_like_hu", "values look like HU", ""},
+                                                                  {"lower_hu", "threshold", ""},
+                                                                  {"change_percent_per_50_hu", "50 HU either way change bone by", "%"},
+                                                                  {"table", "table, head holder", ""},
+                                                                  {"outside_body_mm3", "taken off outside the body", ""},
+                                                                  {"small_pieces_mm3", "small pieces dropped", ""},
+                                                                  {"mask_volume_mm3", "bone by the mask", ""},
+                                                                  {"volume_before_mm3", "bone by the mask", ""},
+                                                                  {"volume_after_mm3", "bone in the case", ""},
+                                                                  {"volume_change_percent", "difference", ""},
+                                                                  {"volume_change_unshifted_percent", "difference without the shift", ""},
+                                                                  {"boundary_offset_hu", "threshold shifted by", ""}}};
+
+}  // namespace
+
+std::pair<std::string, std::string> fact_text(const std::string& key, const ReportValue& value) {
+  std::string name = key, text = short_text(value);
+  const bool is_number = std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
+  const double number = std::holds_alternative<double>(value) ? std::get<double>(value)
+                        : is_number                           ? static_cast<double>(std::get<std::int64_t>(value))
+                                                              : 0;
+  if (is_number) static_cast<void>(with_unit(name, number, text));
   std::replace(name.begin(), name.end(), '_', ' ');
+  for (const auto& [fact, words, unit] : kWords) {
+    if (key != fact) continue;
+    name = words;
+    if (!unit.empty()) text = (unit == "%" ? decimals(number, 1) : short_text(value)) + " " + std::string(unit);
+  }
   return {name, text};
 }
 

@@ -13,6 +13,29 @@
 namespace osteo {
 namespace {
 
+// A text of the file might name a place or a person: only makers that are known are passed on, in our own spelling.
+std::string known_maker(const std::string& manufacturer) {
+  constexpr std::array<std::array<std::string_view, 2>, 14> kMakers{{{"siemens", "Siemens"},
+                                                                     {"ge medical", "GE"},
+                                                                     {"general electric", "GE"},
+                                                                     {"philips", "Philips"},
+                                                                     {"canon", "Canon"},
+                                                                     {"toshiba", "Toshiba"},
+                                                                     {"hitachi", "Hitachi"},
+                                                                     {"fujifilm", "Fujifilm"},
+                                                                     {"united imaging", "United Imaging"},
+                                                                     {"planmeca", "Planmeca"},
+                                                                     {"carestream", "Carestream"},
+                                                                     {"sirona", "Sirona"},
+                                                                     {"morita", "Morita"},
+                                                                     {"marconi", "Marconi"}}};
+  const std::string low = lower_case(manufacturer);
+  for (const auto& [word, name] : kMakers) {
+    if (low.find(word) != std::string::npos) return std::string(name);
+  }
+  return {};
+}
+
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 struct Candidate {
@@ -331,6 +354,7 @@ class Placer {
     if (!h.study_uid.empty() && !h.frame_of_reference_uid.empty()) v.scan_hash = hash_text(h.study_uid + '\n' + h.frame_of_reference_uid);
     v.modality = h.modality;
     v.kernel = h.kernel;
+    v.scanner = known_maker(h.manufacturer);
     v.columns = h.columns;
     v.rows = h.rows;
     v.pixel_mm[0] = f.column_spacing_mm;

@@ -59,6 +59,7 @@ std::string to_json(const Verdict& v) {
     j["series"] = {{"number", v.series},     {"stack", v.stack},   {"stacks", v.stacks},
                    {"modality", v.modality}, {"kernel", v.kernel}, {"thickness_mm", tidy(v.thickness_mm)},
                    {"why", v.why_chosen}};
+    if (!v.scanner.empty()) j["series"]["scanner"] = v.scanner;
     if (!v.scan_hash.empty()) j["series"]["scan_hash"] = v.scan_hash;
     j["geometry"] = {{"slices", v.slices.size()},
                      {"columns", v.columns},

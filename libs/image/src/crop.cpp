@@ -22,7 +22,10 @@ Skull find_skull(const Image& ct) {
   // A head holder may reach higher than the head.
   std::vector<std::uint8_t> mask(ct.frame.voxel_count());
   for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = ct.voxels[i] >= kBoneHu ? 1 : 0;
-  image::clear_outside_body(mask.data(), ct, {});
+  const image::Outside outside = image::find_outside(mask.data(), ct, {});
+  for (const auto* voxels : {&outside.certain, &outside.doubtful}) {
+    for (const std::size_t i : *voxels) mask[i] = 0;
+  }
   Frame f = ct.frame;
   for (std::size_t a = 0; a < 3; ++a) {
     f.dims[a] = (f.dims[a] + 1) / 2;

@@ -59,11 +59,54 @@ void fill_cavities(std::uint8_t* mask, const Frame& frame, double max_mm3) {
   paint(mask, parts, frame.dims[0], 1, enclosed);
 }
 
+void take_table_off(std::uint8_t* mask, const Image& ct, const ThresholdParams& p, const Context& context) {
+  const image::Outside found = image::find_outside(mask, ct, context);
+  const double voxel_mm3 = ct.frame.voxel_volume_mm3();
+  const auto volume = [&](std::size_t voxels) {
+    const double mm3 = static_cast<double>(voxels) * voxel_mm3;
+    return mm3 < 1000 ? std::to_string(std::lround(mm3)) + " mm3" : format_number(std::round(mm3 / 100) / 10) + " cm3";
+  };
+  std::size_t cleared = 0;
+  const auto clear = [&](const std::vector<std::size_t>& voxels) {
+    for (const std::size_t i : voxels) mask[i] = 0;
+    cleared += voxels.size();
+  };
+  const std::size_t all = found.certain.size() + found.doubtful.size();
+  std::string said;
+  if (all == 0) {
+    said = "none found";
+  } else if (p.keep_table) {
+    said = "left on, as asked: " + volume(all) + " lie outside the body";
+  } else if (p.remove_table) {
+    clear(found.certain);
+    clear(found.doubtful);
+    said = "taken off, as asked: " + volume(all);
+  } else {
+    clear(found.certain);
+    if (!found.certain.empty()) {
+      said = "taken off: " + volume(found.certain.size()) + " in " + std::to_string(found.pieces) +
+             (found.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(std::lround(found.nearest_mm)) + " mm and more from the body";
+      context.info("table or head holder " + said + " (--keep-table leaves it on)");
+    }
+    if (!found.doubtful.empty()) {
+      const std::string left = volume(found.doubtful.size()) + " outside the body, which may be table or holder, LEFT ON: " + found.doubt;
+      said += (said.empty() ? "" : "; ") + left;
+      // Less than any table has, and teeth and the tip of a nose reach so far.
+      if (static_cast<double>(found.doubtful.size()) * voxel_mm3 >= 1000) context.warn(left + "; --remove-table takes it off");
+    }
+  }
+  context.report("table", said);
+  context.report("outside_body_mm3", static_cast<double>(cleared) * voxel_mm3);
+}
+
 void drop_small_pieces(std::uint8_t* mask, const Frame& frame, const ThresholdParams& p, const Context& context) {
   const auto parts = connected_components({mask, frame.voxel_count()}, frame.dims, 1, p.connectivity);
   const auto drop = components_to_drop(parts, p.min_volume_mm3 / frame.voxel_volume_mm3(), p.keep_largest);
   const auto kept = static_cast<std::int64_t>(std::count(drop.begin(), drop.end(), false));
   paint(mask, parts, frame.dims[0], 0, drop);
+  std::uint64_t dropped = 0;
+  for (std::size_t c = 0; c < drop.size(); ++c) dropped += drop[c] ? parts.voxels[c] : 0;
+  context.report("small_pieces_mm3", static_cast<double>(dropped) * frame.voxel_volume_mm3());
   context.report("pieces_found", static_cast<std::int64_t>(parts.voxels.size()));
   context.report("pieces_kept", kept);
 }
@@ -89,6 +132,8 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
     }
   }
   context.report("lower_hu", p.lower);
+  if (p.keep_table && p.remove_table)
+    throw Error(ExitCode::usage, "--keep-table and --remove-table contradict each other", "give one of them");
   if (p.lower > p.upper) {
     throw Error(ExitCode::usage, "--lower " + format_number(p.lower) + " HU is above --upper " + format_number(p.upper) + " HU");
   }
@@ -97,11 +142,8 @@ Labels threshold(const Image& ct, const ThresholdParams& given, const Context& c
   parallel_for(n, kGrain, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) mask[i] = ct.voxels[i] >= p.lower && ct.voxels[i] <= p.upper ? 1 : 0;
   });
-  if (p.remove_table) {
-    context.progress(0.1, "body");
-    const std::size_t cleared = image::clear_outside_body(mask.get(), ct, context.sub(0.1, 0.15));
-    context.report("outside_body_mm3", static_cast<double>(cleared) * ct.frame.voxel_volume_mm3());
-  }
+  context.progress(0.1, "body");
+  take_table_off(mask.get(), ct, p, context.sub(0.1, 0.15));
   if (p.metal_mm > 0) {
     std::size_t metal = 0;
     const std::size_t cleared =

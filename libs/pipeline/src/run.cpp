@@ -79,7 +79,8 @@ class Runner {
     std::size_t to_run = 0;
     for (std::size_t n = 0; n < stages_.size(); ++n) {
       fresh[n] = options_.reuse && outputs_are_fresh(n);
-      if (fresh[n] || pipeline_.nodes[n].outputs.empty()) continue;
+      const bool always = options_.always.contains(pipeline_.nodes[n].id);
+      if (!always && (fresh[n] || pipeline_.nodes[n].outputs.empty())) continue;
       mark_needed(n, fresh);
       for (const auto& [port, path] : pipeline_.nodes[n].outputs) check_place(*find_port(stages_[n]->info().outputs, port), path);
     }
@@ -219,6 +220,7 @@ class Runner {
       for (std::size_t p = 0; p < info.outputs.size(); ++p) {
         const auto it = node.outputs.find(info.outputs[p].name);
         if (it != node.outputs.end()) save_output(n, info.outputs[p].name, values_[n][p], it->second, context);
+        if (options_.seen) options_.seen(node.id, info.outputs[p].name, values_[n][p]);
       }
     } catch (const ErrorWithDocument& e) {
       const auto it = node.outputs.find(e.port());

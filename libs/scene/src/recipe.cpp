@@ -135,6 +135,9 @@ std::vector<RecipeChange> change_settings(Recipe& r, const std::map<std::string,
   if (preset != given.end() && preset->second && *preset->second != "fixed")
     dropped.emplace_back("lower", "the preset finds the threshold");
   if (given.contains("lower") && given.at("lower")) dropped.emplace_back("preset", "it would not use --lower");
+  for (const auto& [one, other] : {std::pair{"keep_table", "remove_table"}, std::pair{"remove_table", "keep_table"}}) {
+    if (const auto it = given.find(one); it != given.end() && it->second == "true") dropped.emplace_back(other, "the other was asked for");
+  }
   for (const auto& [name, value] : given) set(name, value, "");
   for (const auto& [name, why] : dropped) {
     const auto it = r.settings.find(name);

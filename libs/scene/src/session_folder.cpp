@@ -10,6 +10,7 @@
 #include "osteo/bone/plates.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
+#include "osteo/scene/approval.h"
 #include "osteo/session/haptic_settings.h"
 #include "osteo/session/session_reader.h"
 
@@ -29,7 +30,7 @@ ordered_json quantiles(const Histogram& h) {
 }  // namespace
 
 SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case_folder, const fs::path& resumed_from) {
-  SessionFolder s{wanted, case_folder, resumed_from};
+  SessionFolder s{wanted, case_folder, resumed_from, {}};
   if (wanted.empty()) {
     for (int n = 1;; ++n) {
       s.folder = case_folder / "sessions" / std::to_string(n);
@@ -45,6 +46,14 @@ SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case
                 "choose a folder that you may write to");
   ordered_json j{{"osteotome_session_folder", 1}, {"case", relative_to(case_folder, s.folder)}};
   if (!resumed_from.empty()) j["resumed_from"] = relative_to(resumed_from, s.folder);
+  try {
+    const ApprovalNow now = approval_of(case_folder);
+    s.approval = now.words();
+    j["approval"] = ordered_json::parse(approval_json(now).dump());
+    j["approval"]["words"] = s.approval;
+  } catch (const Error&) {
+    // A session on what is no case, as tests have them: nothing is known of it.
+  }
   write_file(s.folder / "session.json", j.dump(2) + "\n");
   return s;
 }
@@ -53,10 +62,11 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
   require_readable(folder);
   const fs::path file = folder / "session.json";
   if (!fs::exists(file)) throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
-  SessionFolder s{folder, case_folder, {}};
+  SessionFolder s{folder, case_folder, {}, {}};
   try {
     const auto j = ordered_json::parse(read_text(file));
     if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
+    if (j.contains("approval")) s.approval = j["approval"].at("words").get<std::string>();
     if (j.contains("resumed_from")) s.resumed_from = folder / j["resumed_from"].get<std::string>();
   } catch (const nlohmann::json::exception& e) {
     throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + json_complaint(e));

@@ -42,7 +42,7 @@ std::vector<Data> CropStage::run(const Params& params, std::span<const Data> inp
 StageInfo ThresholdStage::info() {
   return {
       .name = "threshold",
-      .version = 2,
+      .version = 3,
       .synopsis = "bone mask from a CT by Hounsfield units",
       .description =
           "Marks the voxels between two HU values, then cleans the mask: table and head holder, streaks near metal, hysteresis, closing, "

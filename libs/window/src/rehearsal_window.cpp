@@ -58,6 +58,8 @@ class RehearsalWindow {
         actions_(actions),
         sound_(sound),
         scan_(options.scan),
+        approval_(options.approval),
+        approval_ended_(options.approval_ended),
         state_file_(options.state_file),
         device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
@@ -504,6 +506,7 @@ class RehearsalWindow {
                 static_cast<double>(world_view_->triangles()) / 1e6);
     ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
     ImGui::Separator();
+    draw_approval(approval_, approval_ended_);
     draw_scan(scan_);
     ImGui::TextWrapped("F1: mouse and keys");
     if (const std::string told = control_.told(); !told.empty()) {
@@ -560,6 +563,8 @@ class RehearsalWindow {
   WindowActions actions_;
   SoundOut& sound_;
   VerdictSummary scan_;
+  const std::string approval_;
+  const bool approval_ended_;
   std::filesystem::path state_file_;
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;

@@ -80,4 +80,11 @@ void draw_scan(const VerdictSummary& scan) {
   ImGui::Separator();
 }
 
+void draw_approval(const std::string& words, bool ended) {
+  if (words.empty()) return;
+  ImGui::PushStyleColor(ImGuiCol_Text, ended ? ImVec4(1.0F, 0.8F, 0.35F, 1) : ImVec4(0.75F, 0.8F, 0.85F, 1));
+  ImGui::TextWrapped("Case: %s", words.c_str());
+  ImGui::PopStyleColor();
+}
+
 }  // namespace osteo

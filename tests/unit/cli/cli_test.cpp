@@ -159,7 +159,14 @@ TEST(Cli, VersionNamesTheCommit) {
 
 TEST(Cli, FactsAreForPeople) {
   using P = std::pair<std::string, std::string>;
-  EXPECT_EQ(cli::fact_text("mask_volume_mm3", 511409.3), (P{"mask volume", "511409 mm3"}));
+  EXPECT_EQ(cli::fact_text("mask_volume_mm3", 511409.3), (P{"bone by the mask", "511.4 cm3"}));
+  EXPECT_EQ(cli::fact_text("air_mm3", 411.04), (P{"air", "411 mm3"}));
+  EXPECT_EQ(cli::fact_text("volume_change_percent", -0.00038076), (P{"difference", "less than 0.1 %"}));
+  EXPECT_EQ(cli::fact_text("spacing_mm", 0.48828119999999997), (P{"spacing", "0.49 mm"}));
+  EXPECT_EQ(cli::fact_text("distance_mm", 0.0031416), (P{"distance", "0.0031 mm"}));
+  EXPECT_EQ(cli::fact_text("distance_mm", 0.0), (P{"distance", "0 mm"}));
+  EXPECT_EQ(cli::fact_text("change_percent_per_50_hu", 4.26637), (P{"50 HU either way change bone by", "4.3 %"}));
+  EXPECT_EQ(cli::fact_text("hu_min", std::int64_t{-1024}), (P{"lowest value", "-1024 HU"}));
   EXPECT_EQ(cli::fact_text("marching_cubes_distance_max_voxels", 0.17), (P{"marching cubes distance", "0.17 voxels, the most"}));
   EXPECT_EQ(cli::fact_text("facial nerve mm3", 12.5), (P{"facial nerve", "12.5 mm3"}));
   EXPECT_EQ(cli::fact_text("pieces", std::int64_t{36}), (P{"pieces", "36"}));

@@ -87,6 +87,7 @@ struct Verdict {
   std::string source = "DICOM";
   int series = 0, stack = 1, stacks = 1;
   std::string modality, kernel, why_chosen;
+  std::string scanner;    ///< who made it, as one of a fixed list of makers; empty where it is none of them: no other text of the file
   std::string scan_hash;  ///< of its study and frame of reference: the same for all series of one scan; empty where they are not known
   int columns = 0, rows = 0;
   double pixel_mm[2] = {0, 0};

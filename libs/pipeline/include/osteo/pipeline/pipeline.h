@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,6 +57,10 @@ struct RunOptions {
   bool reuse = false;      ///< keep outputs that exist and would come out the same; make the others again
   /// Where an output is written before the caller moves it to its place, once all are made. Empty: straight to its place.
   std::function<std::filesystem::path(const std::filesystem::path& output)> place = {};
+  /// Ids of nodes that are run even if all their outputs are there, or they write none.
+  std::set<std::string> always = {};
+  /// Called with each output of each node that was run, as soon as it is made. Whoever keeps the value keeps its memory.
+  std::function<void(const std::string& id, const std::string& port, const Data& value)> seen = {};
 };
 
 struct NodeResult {

@@ -12,13 +12,14 @@ struct SessionFolder {
   std::filesystem::path folder;
   std::filesystem::path case_folder;
   std::filesystem::path resumed_from;  ///< the session whose end is this one's beginning, or empty
+  std::string approval = {};           ///< who stood for the case when it began, in words; empty: not known
 
   [[nodiscard]] std::filesystem::path stream() const { return folder / "stream.oss"; }
   [[nodiscard]] std::filesystem::path summary() const { return folder / "summary.json"; }
 };
 
 /// Makes a new, empty folder: `wanted`, or when that is empty CASE/sessions/N with the first free N. Writes session.json,
-/// which ties it to the case by relative paths. Error(cannot_write) when `wanted` holds something.
+/// which ties it to the case by relative paths and says whether the case was approved. Error(cannot_write) when `wanted` holds something.
 [[nodiscard]] SessionFolder create_session_folder(const std::filesystem::path& wanted, const std::filesystem::path& case_folder,
                                                   const std::filesystem::path& resumed_from);
 

@@ -27,7 +27,12 @@ struct ThresholdStage {
     visit({"upper", "keep voxels at or below this value", "HU", -32768, 32767}, p.upper);
     visit({"core", "hysteresis: keep only pieces that hold a voxel at or above this value (off at or below lower)", "HU", -32768, 32767},
           p.core);
-    visit({"remove_table", "clear what lies outside the body: table, head holder, wires"}, p.remove_table);
+    visit({"remove_table",
+           "clear all that lies outside the body (table, head holder, wires), also where that is not certain; without it only what touches "
+           "no bone "
+           "of the body, is far from it and in air"},
+          p.remove_table);
+    visit({"keep_table", "clear nothing outside the body, however certain"}, p.keep_table);
     visit({"metal_mm", "clear streaks within this distance of metal (0: off)", "mm", 0, 100}, p.metal_mm);
     visit({"metal_hu", "metal is what is at or above this value", "HU", 500, 32767}, p.metal_hu);
     visit({"metal_lower", "near metal, bone must be at or above this value", "HU", -1024, 32767}, p.metal_lower);

@@ -20,6 +20,8 @@ struct WindowOptions {
   bool from_case = true;             ///< how the first session begins
   std::string device = "mouse";      ///< as the panel names it
   VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
+  std::string approval;              ///< of the case, in words; empty: unknown
+  bool approval_ended = false;       ///< by a later change: said in another colour
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 

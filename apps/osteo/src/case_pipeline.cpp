@@ -1,0 +1,166 @@
+#include "case_pipeline.h"
+
+#include <algorithm>
+#include <ostream>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+
+namespace osteo {
+namespace {
+
+std::string quoted(const std::string& text) {
+  return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
+}
+
+// A threshold that was asked for is where the boundary of bone lies; resample need not guess it from the mask.
+void pass_threshold_on(Pipeline& pipeline) {
+  for (PipelineNode& bone : pipeline.nodes) {
+    const auto mask = bone.inputs.find("mask");
+    if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
+    for (const PipelineNode& n : pipeline.nodes) {
+      if (n.id != mask->second.node || n.stage != "threshold" || !n.params.contains("lower")) continue;
+      const auto preset = n.params.find("preset");
+      if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
+    }
+  }
+}
+
+// The nodes that these need, without anything written.
+Pipeline up_to(const Pipeline& pipeline, const std::vector<std::string>& ids) {
+  std::vector<std::string> open = ids, wanted;
+  while (!open.empty()) {
+    const std::string id = open.back();
+    open.pop_back();
+    if (id.empty() || std::find(wanted.begin(), wanted.end(), id) != wanted.end()) continue;
+    wanted.push_back(id);
+    for (const PipelineNode& n : pipeline.nodes) {
+      if (n.id != id) continue;
+      for (const auto& [port, input] : n.inputs) open.push_back(input.node);
+    }
+  }
+  Pipeline part = pipeline;
+  std::erase_if(part.nodes, [&](const PipelineNode& n) { return std::find(wanted.begin(), wanted.end(), n.id) == wanted.end(); });
+  for (PipelineNode& n : part.nodes) n.outputs.clear();
+  return part;
+}
+
+}  // namespace
+
+std::string flag_of(const std::string& name, const std::string& value, const std::vector<FieldRef>& fields) {
+  for (const FieldRef& f : fields) {
+    if (f.doc.name != name) continue;
+    if (f.kind() != "flag") return f.flag() + " " + quoted(value);
+    return value == "true" ? f.flag() : "--no-" + f.flag().substr(2);
+  }
+  return "--set " + name + "=" + quoted(value);
+}
+
+std::string flags_of(const Recipe& recipe) {
+  PrepareCommand::Params params;
+  const auto fields = fields_of<PrepareCommand>(params);
+  std::string all;
+  for (const auto& [name, value] : recipe.settings) {
+    // Such values may name the patient: that there was one is said, not which.
+    all += " " + (recipe.withheld.contains(name) ? flag_of(name, "...", fields) : flag_of(name, value, fields));
+  }
+  for (const std::string& name : recipe.lost) all += " " + flag_of(name, "...", fields);
+  if (!recipe.structures_hash.empty()) all += " --structures";
+  if (!recipe.pipeline_hash.empty()) all += " --pipeline";
+  return all.empty() ? " nothing" : all;
+}
+
+Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::path& source, const fs::path& structures, bool as_held,
+                       const fs::path& folder) {
+  std::map<std::string, std::string> settings = recipe.settings;
+  settings.erase("names");
+  settings["source"] = source.string();
+  settings["case"] = folder.string();
+  Pipeline pipeline = parse_pipeline(text, settings);
+  if (!structures.empty()) {
+    PipelineNode node;
+    node.id = node.stage = "structures";
+    node.inputs["labels"].file = structures;
+    const bool has_ct = std::any_of(pipeline.nodes.begin(), pipeline.nodes.end(), [](const PipelineNode& n) { return n.id == "ct"; });
+    if (has_ct) node.inputs["image"].node = "ct";
+    const auto names = recipe.settings.find("names");
+    if (names != recipe.settings.end() && !as_held) {
+      node.params["names"] = names->second;
+      node.params["only_named"] = "true";
+    }
+    node.outputs["structures"] = folder / "structures.seg.nrrd";
+    pipeline.nodes.push_back(std::move(node));
+    for (PipelineNode& n : pipeline.nodes) {
+      if (n.id == "preview") n.inputs["mask"].node = "structures";
+    }
+  }
+  pass_threshold_on(pipeline);
+  return pipeline;
+}
+
+ScanKeeper::ScanKeeper(const Pipeline& pipeline) {
+  for (const PipelineNode& n : pipeline.nodes) {
+    const auto image = n.inputs.find("image"), mask = n.inputs.find("mask");
+    if (n.stage != "resample" || image == n.inputs.end() || mask == n.inputs.end()) continue;
+    if (image->second.node.empty() || mask->second.node.empty()) continue;
+    image_ = {image->second.node, image->second.port};
+    mask_ = {mask->second.node, mask->second.port};
+    return;
+  }
+}
+
+std::function<void(const std::string&, const std::string&, const Data&)> ScanKeeper::sink() {
+  return [this](const std::string& id, const std::string& port, const Data& value) {
+    const auto is = [&](const std::pair<std::string, std::string>& wanted) {
+      return id == wanted.first && (wanted.second.empty() || port == wanted.second);
+    };
+    if (const auto* image = std::get_if<Image>(&value); image != nullptr && is(image_)) ct_ = *image;
+    if (const auto* labels = std::get_if<Labels>(&value); labels != nullptr && is(mask_)) labels_ = *labels;
+  };
+}
+
+std::optional<CaseScan> ScanKeeper::take() {
+  if (!ct_ || !labels_) return std::nullopt;
+  CaseScan scan{std::move(*ct_), std::move(*labels_)};
+  ct_.reset();
+  labels_.reset();
+  return scan;
+}
+
+CaseReport report_on(const fs::path& folder, const std::string& asked_for, const std::optional<Pipeline>& pipeline,
+                     std::optional<CaseScan> scan, cli::Invocation& io) {
+  try {
+    if (!scan && pipeline && !has_full_report(folder)) {
+      ScanKeeper keeper(*pipeline);
+      if (keeper.possible()) {
+        const std::vector<std::string> ids = keeper.ids();
+        RunOptions options;
+        options.overwrite = true;
+        options.always = {ids.begin(), ids.end()};
+        options.seen = keeper.sink();
+        // What there is to say of these steps was said when the case was made.
+        Context quiet = io.context.sub(0, 0.3);
+        static_cast<void>(run_pipeline(up_to(*pipeline, ids), io.registry, options, quiet));
+        static_cast<void>(io.context.take_report());
+        scan = keeper.take();
+      }
+    }
+    CaseReport report = write_case_report(folder, asked_for, scan, io.context);
+    static_cast<void>(io.context.take_report());
+    io.end_progress();
+    if (!io.common.quiet) {
+      io.err << "report: " << (report.unchanged ? "unchanged" : "written") << "\n  " << report.html.string() << "\n  "
+             << report.pdf.string() << '\n';
+      for (const std::string& what : report.left_out) io.err << "  left out: " << what << '\n';
+    }
+    return report;
+  } catch (const Error& e) {
+    io.end_progress();
+    if (e.code() == ExitCode::cancelled) throw;
+    throw Error(e.code(), std::string("the case is whole, but its report is not written: ") + e.what(),
+                e.advice().empty() ? "'osteo report " + folder.string() + "' writes it; --no-report does without" : e.advice());
+  }
+}
+
+}  // namespace osteo

@@ -1,0 +1,115 @@
+// report, approve: a case that a person can look at and stand for.
+#include <ostream>
+
+#include "case_pipeline.h"
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
+#include "osteo/scene/approval.h"
+#include "osteo/scene/case.h"
+#include "temporal_bone_pipeline.h"
+
+namespace osteo {
+namespace {
+
+// The pipeline of the case up to its mask, where the scan and all that it was asked for are at hand.
+std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::optional<Recipe>& recipe, const std::string& given) {
+  if (!recipe) {
+    if (!given.empty())
+      throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version and does not know its scan",
+                  "make it anew, with prepare");
+    return std::nullopt;
+  }
+  fs::path scan;
+  if (!given.empty()) {
+    require_readable(given);
+    if (hash_path(given) != recipe->source_hash)
+      throw Error(ExitCode::corrupt, "'" + given + "' is not the scan that '" + folder.string() + "' was made from, or was changed since");
+    scan = given;
+  } else if (const auto known = recall_file(recipe->source_hash)) {
+    scan = *known;
+  }
+  std::string text(kTemporalBonePipeline);
+  if (!recipe->pipeline_hash.empty()) {
+    const auto known = recall_file(recipe->pipeline_hash);
+    if (!known) return std::nullopt;
+    text = read_text(*known);
+  }
+  if (scan.empty() || !recipe->lost.empty()) return std::nullopt;
+  return case_pipeline(text, *recipe, scan, {}, false, folder);
+}
+
+CaseReport make_report(const fs::path& folder, const std::string& given, cli::Invocation& io) {
+  const auto recipe = read_recipe(folder);
+  return report_on(folder, recipe ? flags_of(*recipe) : " (made by an earlier version, which did not keep its flags)",
+                   pipeline_at_hand(folder, recipe, given), std::nullopt, io);
+}
+
+}  // namespace
+
+cli::CommandInfo ReportCommand::info() {
+  return {
+      "report",
+      "the report of a case, to look at, print and sign",
+      "Writes CASE.report.html and CASE.report.pdf beside the case, as prepare does: two pages with the scan's facts, cuts with the bone's "
+      "outline, the bone from six sides, what was taken off, what the scan can resolve, structures and a line to sign. Its cuts are "
+      "pictures of the "
+      "patient, so it is not in the case. Without the scan the pictures of an earlier report of the same state are kept, or left out, and "
+      "it says so.",
+      {{"case", "a folder made by prepare"}},
+      "osteo report CASE"};
+}
+
+int ReportCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path folder = io.arguments[0];
+  const CaseReport report = make_report(folder, p.scan, io);
+  if (io.common.json) {
+    io.out << Json{{"html", report.html.string()}, {"pdf", report.pdf.string()}, {"unchanged", report.unchanged},
+                   {"left_out", report.left_out},  {"code", case_code(folder)},  {"approval", approval_json(approval_of(folder))}}
+                  .dump(2)
+           << '\n';
+  }
+  return 0;
+}
+
+cli::CommandInfo ApproveCommand::info() {
+  return {"approve",
+          "say that a person has looked at a case and stands for it",
+          "Writes the name, today's date and the note into the case, bound to the content of its files and to the report: any later change "
+          "ends it. Shown by "
+          "'osteo info CASE', in the report, in the rehearsal's window and in each session. The name is kept as it is given: it is the "
+          "only one in a "
+          "case. 'osteo rehearse --require-approved' refuses a case without.",
+          {{"case", "a folder made by prepare"}},
+          "osteo approve CASE --by 'A. Miller' --note 'mastoid only'"};
+}
+
+int ApproveCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path folder = io.arguments[0];
+  if (p.withdraw && (!p.by.empty() || !p.note.empty()))
+    throw Error(ExitCode::usage, "--withdraw takes the approval back: --by and --note do nothing beside it", "leave them out");
+  // A case whose files are not what its manifest says is not to be approved.
+  static_cast<void>(load_case(folder));
+  if (p.withdraw) {
+    if (!withdraw_approval(folder))
+      throw Error(ExitCode::failed, "'" + folder.string() + "' is not approved: there is nothing to take back");
+  } else {
+    // Looked at must have been the case as it is.
+    if (output_exists(report_file(folder, ".html")) && !report_shows(folder)) {
+      throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case as it was before its last change",
+                  "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
+    }
+    approve(folder, p.by, p.note);
+  }
+  const CaseReport report = make_report(folder, {}, io);
+  const ApprovalNow now = approval_of(folder);
+  if (io.common.json) {
+    io.out << Json{{"approval", approval_json(now)}, {"report", report.html.string()}}.dump(2) << '\n';
+  } else if (!io.common.quiet) {
+    io.err << case_code(folder) << ": " << now.words() << '\n';
+  }
+  return 0;
+}
+
+}  // namespace osteo
