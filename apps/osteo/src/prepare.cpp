@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "case_edits.h"
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -31,7 +32,7 @@ void pass_threshold_on(Pipeline& pipeline) {
     const auto mask = bone.inputs.find("mask");
     if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
     for (const PipelineNode& n : pipeline.nodes) {
-      if (n.id != mask->second.node || n.stage != "threshold" || !n.params.contains("lower")) continue;
+      if (n.id != mask_before_edits(pipeline, mask->second.node) || n.stage != "threshold" || !n.params.contains("lower")) continue;
       const auto preset = n.params.find("preset");
       if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
     }
@@ -83,7 +84,7 @@ std::string flag_of(const std::string& name, const std::string& value, const std
 // What is asked for now, by variable; none where a setting is dropped.
 std::map<std::string, std::optional<std::string>> given_now(const std::vector<FieldRef>& fields, const cli::Invocation& io) {
   std::map<std::string, std::optional<std::string>> given;
-  const auto own = [](const std::string& name) { return name == "out" || name == "pipeline" || name == "structures" || name == "fresh"; };
+  const auto own = [](const std::string& name) { return name == "out" || name == "pipeline" || name == "structures" || name == "edits" || name == "fresh"; };
   for (const FieldRef& f : fields) {
     const std::string name(f.doc.name), value = f.to_text();
     if (!io.given.contains(name) || own(name)) continue;
@@ -133,6 +134,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
 
   const auto all_of = [&](const Recipe& r) {
     std::string all = r.structures_hash.empty() ? "" : " --structures";
+    if (!r.edits_hash.empty()) all += " --edits";
     for (const auto& [name, value] : r.settings) all += " " + flag_of(name, value, fields);
     return all.empty() ? " nothing" : all;
   };
@@ -212,7 +214,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (const auto path = recall_file(structures.hash)) {
       structures.path = *path;
     } else if (!given.contains("names") && fs::exists(folder / "structures.seg.nrrd")) {
-      structures.path = folder / "structures.seg.nrrd";
+      structures.path = folder / (fs::exists(folder / kGivenStructures) ? kGivenStructures : "structures.seg.nrrd");
       as_the_case_holds_them = true;
     } else {
       throw Error(ExitCode::no_input,
@@ -227,6 +229,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
                                                       : "--structures: another label map");
   }
   recipe.structures_hash = structures.hash;
+
+  const auto edits = edits_of_case(folder, io.given.contains("edits") ? std::optional(p.edits) : std::nullopt, recipe, notes);
 
   // The settings. One that another pipeline does not have may only be left alone.
   const auto known = pipeline_variables(text);
@@ -284,6 +288,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       if (n.id == "preview") n.inputs["mask"].node = "structures";
     }
   }
+  if (edits) add_edits(pipeline, *edits, folder, given.contains("lower") || given.contains("preset"));
   pass_threshold_on(pipeline);
   validate(pipeline, io.registry);
 

@@ -30,6 +30,7 @@ cli::Program make_osteo_program() {
   p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();
+  p.add<EditCommand>();
   p.add<SceneCommand>();
   p.add<PlanCommand>();
   p.add<RehearseCommand>();
