@@ -111,6 +111,7 @@ struct EditDocument::State {
     start_bone = WordChanges(none.words(), bone.words());
     start_labels = WordChanges(sparse_labels());
     start_hash = hash();
+    ct_hash = hash_of(ct);
   }
 
   // --- the state ----------------------------------------------------------------------------------------------------------------------
@@ -126,7 +127,7 @@ struct EditDocument::State {
   std::uint64_t version = 0;
   WordChanges start_bone, start_labels;
   Structures start_structures;
-  std::string start_hash;
+  std::string start_hash, ct_hash;
   // A stroke that is being drawn.
   std::optional<BrushEdit> stroke;
   Recorder stroke_changes;
@@ -646,6 +647,10 @@ std::string EditDocument::hash() const {
 }
 const std::string& EditDocument::start_hash() const {
   return state_->start_hash;
+}
+
+const std::string& EditDocument::ct_hash() const {
+  return state_->ct_hash;
 }
 
 Labels EditDocument::bone_labels(int threads) const {

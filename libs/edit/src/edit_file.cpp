@@ -64,7 +64,7 @@ Operation read_operation(const JsonFile& file, const JsonValue& j, const std::st
 }  // namespace
 
 EditRecipe recipe_of(const EditDocument& document) {
-  EditRecipe r{hash_of(document.ct()), document.start_hash(), document.hash(), document.operations(), {}};
+  EditRecipe r{document.ct_hash(), document.start_hash(), document.hash(), document.operations(), {}};
   for (const EditStructure& s : document.structures()) {
     if (!s.shown) r.hidden.push_back(s.is.value);
   }
@@ -126,7 +126,7 @@ EditRecipe parse_edits(std::string_view text, const std::string& name) {
 }
 
 void apply_edits(EditDocument& document, const EditRecipe& recipe, const Context& context) {
-  if (recipe.ct_hash != hash_of(document.ct())) {
+  if (recipe.ct_hash != document.ct_hash()) {
     throw Error(ExitCode::usage, "the edits were made on another CT, or on another region of it, than this one",
                 "take the scan, series, region and offset they were made with, or edit this one anew");
   }

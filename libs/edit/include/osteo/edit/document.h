@@ -103,7 +103,9 @@ class EditDocument {
   [[nodiscard]] std::vector<Operation> operations() const;
   /// Content hash of bone, labels and structures (not whether they are shown).
   [[nodiscard]] std::string hash() const;
-  /// The same of the state at the beginning.
+  /// Of the CT, as `hash_of` has it.
+  [[nodiscard]] const std::string& ct_hash() const;
+  /// As `hash`, of the state at the beginning.
   [[nodiscard]] const std::string& start_hash() const;
 
   /// For the pipeline: bone as 0 and 1; structures of a role with names and colours.
