@@ -15,9 +15,8 @@ namespace osteo {
   std::string parts(copyleft_parts());
   if (has_ceres()) parts += std::string(parts.empty() ? "" : " and ") + "Ceres, whose package brings parts of SuiteSparse under the GPL";
   if (!parts.empty()) {
-    licence += ",\nand " + parts + ", so that as a whole it falls under the " +
-                 (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
-                 "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF for one that does not.\n";
+    licence += ",\nand " + parts + ", so that as a whole it falls under the " + (parts.find("AGPL") != std::string::npos ? "AGPL" : "GPL") +
+               "; build with -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF for one that does not.\n";
   } else {
     licence += ";\nit contains neither CGAL (GPL) nor TetGen (AGPL), so it falls under Apache-2.0 as a whole.\n";
   }

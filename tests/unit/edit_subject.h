@@ -28,7 +28,8 @@ inline Image walnut(std::array<int, 3> dims, unsigned seed = 1) {
   for (int k = 0; k < dims[2]; ++k) {
     for (int j = 0; j < dims[1]; ++j) {
       for (int i = 0; i < dims[0]; ++i, ++at) {
-        const double x = (i - dims[0] / 2.0) / (dims[0] / 2.0), y = (j - dims[1] / 2.0) / (dims[1] / 2.0), z = (k - dims[2] / 2.0) / (dims[2] / 2.0);
+        const double x = (i - dims[0] / 2.0) / (dims[0] / 2.0), y = (j - dims[1] / 2.0) / (dims[1] / 2.0),
+                     z = (k - dims[2] / 2.0) / (dims[2] / 2.0);
         const double r = std::sqrt(x * x + y * y + z * z);
         state = state * 1664525U + 1013904223U;
         const int noise = static_cast<int>(state >> 24) - 128;
@@ -54,8 +55,14 @@ inline Labels start_of(const Image& ct, double lower_hu) {
 inline void random_action(EditDocument& d, std::mt19937& random, bool history = true) {
   const Frame& f = d.ct().frame;
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-  const auto point = [&] { return f.world_from_index({below(f.dims[0] * 10) / 10.0, below(f.dims[1] * 10) / 10.0, below(f.dims[2] * 10) / 10.0}); };
-  const auto any_structure = [&] { return d.structures().empty() ? 0 : static_cast<int>(d.structures()[static_cast<std::size_t>(below(static_cast<int>(d.structures().size())))].is.value); };
+  const auto point = [&] {
+    return f.world_from_index({below(f.dims[0] * 10) / 10.0, below(f.dims[1] * 10) / 10.0, below(f.dims[2] * 10) / 10.0});
+  };
+  const auto any_structure = [&] {
+    return d.structures().empty()
+               ? 0
+               : static_cast<int>(d.structures()[static_cast<std::size_t>(below(static_cast<int>(d.structures().size())))].is.value);
+  };
   const int what = below(100);
   if (history && what < 15) {
     for (int n = 1 + below(5); n > 0; --n) static_cast<void>(what < 9 ? d.undo() : d.redo());
@@ -72,7 +79,8 @@ inline void random_action(EditDocument& d, std::mt19937& random, bool history = 
     d.apply(IslandSizeEdit{static_cast<double>(below(20)), below(2) == 0 ? 0 : 1 + below(4)});
   } else if (what < 80) {
     const Vec3 a = point(), b = point();
-    d.apply(BoxEdit{{std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}, {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)},
+    d.apply(BoxEdit{{std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)},
+                    {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)},
                     below(4) == 0 ? BoxChoice::keep_inside : BoxChoice::clear_inside});
   } else if (what < 84) {
     d.apply(FillEdit{static_cast<double>(below(60))});
@@ -80,7 +88,9 @@ inline void random_action(EditDocument& d, std::mt19937& random, bool history = 
     d.apply(SmoothEdit{0.6 + 0.6 * below(2)});
   } else if (what < 92) {
     if (const int value = d.free_value(); value > 0 && value < 9)
-      d.apply(AddStructureEdit{value, "structure " + std::to_string(value) + "." + std::to_string(random() % 1000000U), {below(256), below(256), below(256)},
+      d.apply(AddStructureEdit{value,
+                               "structure " + std::to_string(value) + "." + std::to_string(random() % 1000000U),
+                               {below(256), below(256), below(256)},
                                below(2) == 0 ? StructureRole::at_risk : StructureRole::landmark});
   } else if (what < 94) {
     if (const int value = any_structure(); value > 0)

@@ -17,7 +17,8 @@ namespace {
 // Stages run as they are needed, each once; what they give stays in memory.
 class InMemory {
  public:
-  InMemory(const Pipeline& pipeline, const Registry& registry, const Context& context) : pipeline_(pipeline), registry_(registry), context_(context) {}
+  InMemory(const Pipeline& pipeline, const Registry& registry, const Context& context)
+      : pipeline_(pipeline), registry_(registry), context_(context) {}
 
   Data output(const PipelineNode::Input& from) {
     const PipelineNode& node = find(from.node);
@@ -76,9 +77,12 @@ fs::path found(const std::string& hash, const std::string& what, const std::stri
 CaseScan open_case_scan(const fs::path& folder, const std::string& scan, const Registry& registry, const Context& context) {
   static_cast<void>(load_case(folder));  // finishes an interrupted change; whole and unchanged
   const std::optional<Recipe> recipe = read_recipe(folder);
-  if (!recipe) throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version", "run 'osteo prepare SCAN -o CASE --fresh' with its flags");
+  if (!recipe)
+    throw Error(ExitCode::usage, "'" + folder.string() + "' was made by an earlier version",
+                "run 'osteo prepare SCAN -o CASE --fresh' with its flags");
   if (!recipe->lost.empty()) {
-    throw Error(ExitCode::no_input, "the case was made with a value of '" + *recipe->lost.begin() + "' that names the scan and is not known here",
+    throw Error(ExitCode::no_input,
+                "the case was made with a value of '" + *recipe->lost.begin() + "' that names the scan and is not known here",
                 "run 'osteo prepare SCAN -o CASE' with it again");
   }
   CaseScan result;
@@ -87,11 +91,13 @@ CaseScan open_case_scan(const fs::path& folder, const std::string& scan, const R
   } else {
     require_readable(scan);
     if (hash_path(scan) != recipe->source_hash)
-      throw Error(ExitCode::usage, "'" + scan + "' is another scan than that of the case, or was changed", "a case is edited on the scan it was made from");
+      throw Error(ExitCode::usage, "'" + scan + "' is another scan than that of the case, or was changed",
+                  "a case is edited on the scan it was made from");
     result.scan = scan;
   }
   std::string text(kTemporalBonePipeline);
-  if (!recipe->pipeline_hash.empty()) text = read_text(found(recipe->pipeline_hash, "the pipeline file of the case", "prepare the case again, with --pipeline"));
+  if (!recipe->pipeline_hash.empty())
+    text = read_text(found(recipe->pipeline_hash, "the pipeline file of the case", "prepare the case again, with --pipeline"));
   std::map<std::string, std::string> settings = recipe->settings;
   settings.erase("names");
   settings["source"] = result.scan.string();
@@ -121,7 +127,8 @@ CaseScan open_case_scan(const fs::path& folder, const std::string& scan, const R
   if (!recipe->edits_hash.empty()) {
     const fs::path file = folder / "edits.json";
     if (!output_exists(file) || hash_path(file) != recipe->edits_hash)
-      throw Error(ExitCode::no_input, "'" + file.string() + "' is gone or was changed by hand", "put it back, or: osteo prepare -o CASE --no-edits");
+      throw Error(ExitCode::no_input, "'" + file.string() + "' is gone or was changed by hand",
+                  "put it back, or: osteo prepare -o CASE --no-edits");
     result.edits = parse_edits(read_text(file), file.string());
   }
   return result;

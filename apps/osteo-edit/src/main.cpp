@@ -69,7 +69,8 @@ class Saver {
     ::posix_spawn_file_actions_destroy(&actions);
     if (failed != 0) throw Error(ExitCode::failed, "cannot start '" + args[0] + "': " + std::strerror(failed));
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
   }
 
@@ -99,8 +100,9 @@ struct EditWindowCommand {
     if (edits) apply_edits(document, *edits, io.context);
     io.end_progress();
     if (!io.common.quiet) {
-      io.err << "open: " << document.ct().frame.dims[0] << " x " << document.ct().frame.dims[1] << " x " << document.ct().frame.dims[2] << " voxels"
-             << (edits ? ", " + std::to_string(edits->operations.size()) + " earlier corrections" : std::string()) << std::endl;
+      io.err << "open: " << document.ct().frame.dims[0] << " x " << document.ct().frame.dims[1] << " x " << document.ct().frame.dims[2]
+             << " voxels" << (edits ? ", " + std::to_string(edits->operations.size()) + " earlier corrections" : std::string())
+             << std::endl;
     }
     EditWindowOptions options;
     options.width = p.width;

@@ -42,8 +42,7 @@ void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folde
   const MaskNodes at = mask_nodes(pipeline);
   const auto own = threshold_of(edits.recipe);
   if (own && threshold_asked) {
-    throw Error(ExitCode::usage,
-                "the threshold has no say: the case was edited by hand from " + format_number(*own) + " HU on",
+    throw Error(ExitCode::usage, "the threshold has no say: the case was edited by hand from " + format_number(*own) + " HU on",
                 "change it in 'osteo edit', or --no-edits to drop what was done by hand");
   }
   // Whoever took the mask takes the corrected one.
@@ -51,7 +50,8 @@ void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folde
     for (auto& [port, input] : n.inputs) {
       if (input.node == at.mask.node && input.port == at.mask.port) input = {kNode, "", {}};
     }
-    if (own && n.stage == "resample" && n.inputs.contains("mask") && n.inputs.at("mask").node == kNode) n.params.try_emplace("lower", format_number(*own));
+    if (own && n.stage == "resample" && n.inputs.contains("mask") && n.inputs.at("mask").node == kNode)
+      n.params.try_emplace("lower", format_number(*own));
   }
   PipelineNode node;
   node.id = kNode;

@@ -12,13 +12,14 @@
 namespace osteo {
 
 cli::CommandInfo EditCommand::info() {
-  return {"edit",
-          "correct the bone and the structures of a case by hand",
-          "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and eraser, structures, with "
-          "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes the case's bone anew "
-          "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is never changed.",
-          {{"case", "a folder made by prepare"}},
-          "osteo edit CASE"};
+  return {
+      "edit",
+      "correct the bone and the structures of a case by hand",
+      "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and eraser, structures, with "
+      "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes the case's bone anew "
+      "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is never changed.",
+      {{"case", "a folder made by prepare"}},
+      "osteo edit CASE"};
 }
 
 int EditCommand::run(const Params& p, cli::Invocation& io) {
@@ -44,7 +45,8 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
   // The window is a program of its own, so that servers need neither GLFW nor a display.
   const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-edit";
   if (!fs::exists(program)) {
-    throw Error(ExitCode::failed, "this build has no window (osteo-edit is missing)", "build with -DOSTEO_WINDOW=ON, or use --apply edits.json");
+    throw Error(ExitCode::failed, "this build has no window (osteo-edit is missing)",
+                "build with -DOSTEO_WINDOW=ON, or use --apply edits.json");
   }
   std::vector<std::string> args{program.string(), folder.string()};
   EditFlags flags = p, defaults;

@@ -84,7 +84,9 @@ std::string flag_of(const std::string& name, const std::string& value, const std
 // What is asked for now, by variable; none where a setting is dropped.
 std::map<std::string, std::optional<std::string>> given_now(const std::vector<FieldRef>& fields, const cli::Invocation& io) {
   std::map<std::string, std::optional<std::string>> given;
-  const auto own = [](const std::string& name) { return name == "out" || name == "pipeline" || name == "structures" || name == "edits" || name == "fresh"; };
+  const auto own = [](const std::string& name) {
+    return name == "out" || name == "pipeline" || name == "structures" || name == "edits" || name == "fresh";
+  };
   for (const FieldRef& f : fields) {
     const std::string name(f.doc.name), value = f.to_text();
     if (!io.given.contains(name) || own(name)) continue;
@@ -321,6 +323,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     }
     if (!structures.path.empty() && !other_structures)
       kept += as_the_case_holds_them ? " --structures (as the case holds them: their file is not known here)" : " --structures";
+    if (edits && edits->file == folder / "edits.json") kept += " --edits";
     if (!kept.empty()) io.context.info("kept:" + kept + "   (--fresh forgets all, --no-structures and the like drop one)");
   }
 

@@ -31,7 +31,8 @@ struct Range {
   int lo, hi;
 };
 Range whole_range(double lower_hu, double upper_hu) {
-  return {static_cast<int>(std::ceil(std::clamp(lower_hu, -40000.0, 40000.0))), static_cast<int>(std::floor(std::clamp(upper_hu, -40000.0, 40000.0)))};
+  return {static_cast<int>(std::ceil(std::clamp(lower_hu, -40000.0, 40000.0))),
+          static_cast<int>(std::floor(std::clamp(upper_hu, -40000.0, 40000.0)))};
 }
 
 void mark_range(const std::int16_t* in, std::size_t n, Range range, std::uint8_t* flags) {
@@ -129,8 +130,7 @@ void BitMask::to_bytes(std::uint8_t* out, int threads) const {
   const auto nx = static_cast<std::size_t>(dims_[0]);
   parallel_for(rows(), kRowGrain, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
-      for (std::size_t i = 0; i < nx; ++i)
-        out[r * nx + i] = static_cast<std::uint8_t>(words_[r * words_per_row_ + i / 64] >> (i % 64) & 1);
+      for (std::size_t i = 0; i < nx; ++i) out[r * nx + i] = static_cast<std::uint8_t>(words_[r * words_per_row_ + i / 64] >> (i % 64) & 1);
     }
   });
 }

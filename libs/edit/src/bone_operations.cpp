@@ -19,18 +19,21 @@ void clear_runs(BitMask& bone, const Components& pieces, const std::function<boo
 
 std::string run(const IslandEdit& o, const Image& ct, BitMask& bone, const Context& context) {
   std::array<int, 3> at{};
-  if (!voxel_at(ct.frame, {o.at_mm[0], o.at_mm[1], o.at_mm[2]}, at) || !bone.at(at[0], at[1], at[2])) return "there is no bone at that point";
+  if (!voxel_at(ct.frame, {o.at_mm[0], o.at_mm[1], o.at_mm[2]}, at) || !bone.at(at[0], at[1], at[2]))
+    return "there is no bone at that point";
   context.progress(0.1, "finding pieces");
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
-  const std::uint32_t row = static_cast<std::uint32_t>(at[2]) * static_cast<std::uint32_t>(bone.dims()[1]) + static_cast<std::uint32_t>(at[1]);
+  const std::uint32_t row =
+      static_cast<std::uint32_t>(at[2]) * static_cast<std::uint32_t>(bone.dims()[1]) + static_cast<std::uint32_t>(at[1]);
   const auto x = static_cast<std::uint32_t>(at[0]);
   std::uint32_t chosen = 0;
   for (std::size_t i = 0; i < pieces.runs.size(); ++i) {
     const Run& r = pieces.runs[i];
     if (r.row == row && r.begin <= x && x < r.end) chosen = pieces.component[i];
   }
-  clear_runs(bone, pieces, [&](std::uint32_t c) { return (c == chosen) == (o.choice == IslandChoice::remove); }, false);
+  clear_runs(
+      bone, pieces, [&](std::uint32_t c) { return (c == chosen) == (o.choice == IslandChoice::remove); }, false);
   return {};
 }
 
@@ -39,9 +42,11 @@ std::string run(const IslandSizeEdit& o, const Image& ct, BitMask& bone, const C
   const Components pieces = connected_components(bone.runs(true), bone.dims(), Connectivity::full);
   context.progress(0.8, "marking");
   const std::vector<bool> drop = components_to_drop(pieces, o.min_volume_mm3 / ct.frame.voxel_volume_mm3(), o.keep_largest);
-  clear_runs(bone, pieces, [&](std::uint32_t c) { return static_cast<bool>(drop[c]); }, false);
+  clear_runs(
+      bone, pieces, [&](std::uint32_t c) { return static_cast<bool>(drop[c]); }, false);
   const auto n = std::count(drop.begin(), drop.end(), true);
-  return std::to_string(n) + (n == 1 ? " piece" : " pieces") + " removed, " + std::to_string(drop.size() - static_cast<std::size_t>(n)) + " left";
+  return std::to_string(n) + (n == 1 ? " piece" : " pieces") + " removed, " + std::to_string(drop.size() - static_cast<std::size_t>(n)) +
+         " left";
 }
 
 // Of a row, the voxels whose centres lie within [lo, hi] along every axis: x as far as it is so. A range, since a box is convex.
@@ -74,7 +79,8 @@ std::string run(const BoxEdit& o, const Image& ct, BitMask& bone, const Context&
   const Vec3 step = f.direction.column[0] * f.spacing_mm.x;
   parallel_for(bone.rows(), 256, context.threads, [&](std::size_t first, std::size_t last) {
     for (std::size_t r = first; r < last; ++r) {
-      const auto j = static_cast<double>(r % static_cast<std::size_t>(f.dims[1])), k = static_cast<double>(r / static_cast<std::size_t>(f.dims[1]));
+      const auto j = static_cast<double>(r % static_cast<std::size_t>(f.dims[1])),
+                 k = static_cast<double>(r / static_cast<std::size_t>(f.dims[1]));
       const auto [begin, end] = row_in_box(f.world_from_index({0, j, k}), step, f.dims[0], lo, hi);
       if (o.choice == BoxChoice::clear_inside) {
         bone.set(r, begin, end, false);
@@ -107,7 +113,8 @@ std::string run(const FillEdit& o, const Image& ct, BitMask& bone, const Context
     fill[c] = static_cast<double>(spaces.voxels[c]) <= most;
     ++(fill[c] ? filled : larger);
   }
-  clear_runs(bone, spaces, [&](std::uint32_t c) { return static_cast<bool>(fill[c]); }, true);
+  clear_runs(
+      bone, spaces, [&](std::uint32_t c) { return static_cast<bool>(fill[c]); }, true);
   return std::to_string(filled) + (filled == 1 ? " cavity" : " cavities") + " filled, " + std::to_string(larger) + " larger left";
 }
 
@@ -248,7 +255,8 @@ void rows_of_capsule(const Frame& frame, Vec3 a_mm, Vec3 b_mm, double radius_mm,
       int begin = lo[0], end = hi[0];
       while (begin < end && !inside(begin)) ++begin;
       while (end > begin && !inside(end - 1)) --end;
-      if (begin < end) visit(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j), begin, end);
+      if (begin < end)
+        visit(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j), begin, end);
     }
   }
 }

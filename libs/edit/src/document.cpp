@@ -21,7 +21,8 @@ namespace {
 // Zero, and taking no memory where nobody has written: pages come with the first write.
 class LabelWords {
  public:
-  explicit LabelWords(std::size_t voxels) : words_((voxels + 7) / 8), voxels_(voxels), at_(static_cast<std::uint64_t*>(std::calloc(words_ + 1, 8))) {
+  explicit LabelWords(std::size_t voxels)
+      : words_((voxels + 7) / 8), voxels_(voxels), at_(static_cast<std::uint64_t*>(std::calloc(words_ + 1, 8))) {
     if (!at_) throw std::bad_alloc();
   }
   [[nodiscard]] std::span<std::uint64_t> words() { return {at_.get(), words_}; }
@@ -155,7 +156,8 @@ struct EditDocument::State {
     }
     for (int v = 1; v < 256; ++v) {
       if (bounds[static_cast<std::size_t>(v)].hi[0] > 0 && find(v) == nullptr)
-        structures.push_back({{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {255, 200, 60}}, StructureRole::at_risk, true});
+        structures.push_back(
+            {{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {255, 200, 60}}, StructureRole::at_risk, true});
     }
     std::sort(structures.begin(), structures.end(), [](const auto& a, const auto& b) { return a.is.value < b.is.value; });
   }
@@ -197,8 +199,9 @@ struct EditDocument::State {
     h.add(bone.words().data(), bone.words().size_bytes());
     h.add(labels.bytes().data(), labels.bytes().size());
     for (const EditStructure& s : structures) {
-      const std::string text = std::to_string(s.is.value) + "\n" + s.is.name + "\n" + std::to_string(s.is.rgb[0]) + "," + std::to_string(s.is.rgb[1]) + "," +
-                               std::to_string(s.is.rgb[2]) + "\n" + std::to_string(static_cast<int>(s.role)) + "\n";
+      const std::string text = std::to_string(s.is.value) + "\n" + s.is.name + "\n" + std::to_string(s.is.rgb[0]) + "," +
+                               std::to_string(s.is.rgb[1]) + "," + std::to_string(s.is.rgb[2]) + "\n" +
+                               std::to_string(static_cast<int>(s.role)) + "\n";
       h.add(text.data(), text.size());
     }
     return h.hex();
@@ -291,9 +294,7 @@ struct EditDocument::State {
       return {static_cast<std::uint8_t>(rgb[0]), static_cast<std::uint8_t>(rgb[1]), static_cast<std::uint8_t>(rgb[2])};
     }
   };
-  void run_on_structures(const Operation& operation, Recorder& recorder) {
-    std::visit(Runner{*this, recorder}, operation);
-  }
+  void run_on_structures(const Operation& operation, Recorder& recorder) { std::visit(Runner{*this, recorder}, operation); }
   void require_free(const std::string& name, int but) const {
     for (const EditStructure& s : structures) {
       if (s.is.name == name && s.is.value != but) throw Error(ExitCode::usage, "there is a structure '" + name + "' already");
@@ -302,9 +303,9 @@ struct EditDocument::State {
 
   // --- steps --------------------------------------------------------------------------------------------------------------------------
 
-  void measure(const BitMask& before, EditOutcome& outcome) const {
+  void measure(const BitMask& after, EditOutcome& outcome) const {
     std::uint64_t added = 0, removed = 0;
-    const auto a = before.words(), b = bone.words();
+    const auto a = bone.words(), b = after.words();
     for (std::size_t w = 0; w < a.size(); ++w) {
       if (a[w] == b[w]) continue;
       added += static_cast<std::uint64_t>(std::popcount(b[w] & ~a[w]));
@@ -460,15 +461,21 @@ EditOutcome EditDocument::apply(const Operation& operation, const Context& conte
 }
 
 BonePlan EditDocument::plan(std::vector<Operation> operations, const Context& context) const {
-  BonePlan p{{}, state_->bone, {}, state_->version};
+  BonePlan p{{}, state_->bone, {}, nullptr, state_->version};
+  if (operations.empty()) return p;
   for (std::size_t i = 0; i < operations.size(); ++i) {
     require_valid(operations[i]);
     if (!changes_bone(operations[i])) throw Error(ExitCode::usage, "only operations on bone can be planned");
     context.progress(static_cast<double>(i) / static_cast<double>(operations.size()), operation_text(operations[i]));
     const Context part = context.sub(static_cast<double>(i) / static_cast<double>(operations.size()),
                                      static_cast<double>(i + 1) / static_cast<double>(operations.size()));
-    p.note = run_on_bone(operations[i], state_->ct, p.bone, part);
+    p.outcome.note = run_on_bone(operations[i], state_->ct, p.bone, part);
   }
+  p.outcome.text = operation_text(operations.front());
+  state_->measure(p.bone, p.outcome);
+  p.changes = std::make_shared<const WordChanges>(state_->bone.words(), p.bone.words());
+  p.outcome.changed = !p.changes->empty();
+  if (!p.outcome.changed && p.outcome.note.empty()) p.outcome.note = "nothing changes";
   p.operations = std::move(operations);
   return p;
 }
@@ -476,20 +483,10 @@ BonePlan EditDocument::plan(std::vector<Operation> operations, const Context& co
 EditOutcome EditDocument::commit(BonePlan plan) {
   State& s = *state_;
   if (s.stroke || plan.version != s.version) throw Error(ExitCode::failed, "the mask was changed meanwhile", "do it again");
-  EditOutcome outcome;
-  if (plan.operations.empty()) return outcome;
-  outcome.text = operation_text(plan.operations.front());
-  outcome.note = plan.note;
+  if (!plan.outcome.changed) return plan.outcome;
   std::swap(s.bone, plan.bone);
-  s.measure(plan.bone, outcome);
-  Step step{std::move(plan.operations), true, WordChanges(plan.bone.words(), s.bone.words()), {}, {}};
-  outcome.changed = !step.bone.empty();
-  if (outcome.changed) {
-    s.push(std::move(step));
-  } else if (outcome.note.empty()) {
-    outcome.note = "nothing changes";
-  }
-  return outcome;
+  s.push({std::move(plan.operations), true, *plan.changes, {}, {}});
+  return plan.outcome;
 }
 
 std::vector<Operation> EditDocument::with_later_steps(const ThresholdEdit& threshold) const {
@@ -542,7 +539,8 @@ EditOutcome EditDocument::end_stroke() {
       continue;
     }
     for (int b = 0; b < 8; ++b) {
-      const bool was = (before >> (8 * b) & 255) == static_cast<std::uint64_t>(stroke.structure), is = (words[w] >> (8 * b) & 255) == static_cast<std::uint64_t>(stroke.structure);
+      const bool was = (before >> (8 * b) & 255) == static_cast<std::uint64_t>(stroke.structure),
+                 is = (words[w] >> (8 * b) & 255) == static_cast<std::uint64_t>(stroke.structure);
       outcome.added_mm3 += is && !was ? voxel : 0;
       outcome.removed_mm3 += was && !is ? voxel : 0;
     }

@@ -23,8 +23,9 @@ Json value_of(const FieldRef& field) {
 
 // One of each kind, as it is when nothing is said.
 const std::vector<Operation>& all_kinds() {
-  static const std::vector<Operation> kinds{ThresholdEdit{}, IslandEdit{}, IslandSizeEdit{},   BoxEdit{},             FillEdit{},           SmoothEdit{},
-                                            BrushEdit{},     VoxelsEdit{}, AddStructureEdit{}, ChangeStructureEdit{}, DeleteStructureEdit{}};
+  static const std::vector<Operation> kinds{ThresholdEdit{},    IslandEdit{},          IslandSizeEdit{},     BoxEdit{},
+                                            FillEdit{},         SmoothEdit{},          BrushEdit{},          VoxelsEdit{},
+                                            AddStructureEdit{}, ChangeStructureEdit{}, DeleteStructureEdit{}};
   return kinds;
 }
 
@@ -136,7 +137,8 @@ void apply_edits(EditDocument& document, const EditRecipe& recipe, const Context
     const auto n = static_cast<double>(recipe.operations.size());
     context.progress(static_cast<double>(i) / n, "edits");
     try {
-      const EditOutcome done = document.apply(recipe.operations[i], context.sub(static_cast<double>(i) / n, static_cast<double>(i + 1) / n));
+      const EditOutcome done =
+          document.apply(recipe.operations[i], context.sub(static_cast<double>(i) / n, static_cast<double>(i + 1) / n));
       vain += done.changed ? 0 : 1;
     } catch (const Error& e) {
       throw e.in("operation " + std::to_string(i + 1));
@@ -145,11 +147,13 @@ void apply_edits(EditDocument& document, const EditRecipe& recipe, const Context
   for (const int value : recipe.hidden) document.show(value, false);
   if (same_start) {
     if (document.hash() != recipe.result_hash)
-      throw Error(ExitCode::corrupt, "the edits do not give what they gave when they were saved", "the file was changed: edit the case again");
+      throw Error(ExitCode::corrupt, "the edits do not give what they gave when they were saved",
+                  "the file was changed: edit the case again");
     return;
   }
   context.warn("the edits began from another mask or other structures, so their result is another one: look at it" +
-               (vain > 0 ? "; " + std::to_string(vain) + " of " + std::to_string(recipe.operations.size()) + " steps change nothing" : std::string()));
+               (vain > 0 ? "; " + std::to_string(vain) + " of " + std::to_string(recipe.operations.size()) + " steps change nothing"
+                         : std::string()));
 }
 
 std::optional<double> threshold_of(const EditRecipe& recipe) {

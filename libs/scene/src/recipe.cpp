@@ -75,7 +75,8 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     const JsonFile m(read_text(file), file.string(), ExitCode::corrupt);
     const JsonValue* const j = m.root().find("recipe");
     if (j == nullptr) return std::nullopt;
-    m.allow(*j, "recipe", std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "edits_hash", "settings", "withheld"});
+    m.allow(*j, "recipe",
+            std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "edits_hash", "settings", "withheld"});
     const auto text = [&](const char* key) {
       const JsonValue* const value = j->find(key);
       return value == nullptr ? std::string() : m.text(*value, std::string("recipe: \"") + key + "\"");

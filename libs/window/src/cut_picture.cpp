@@ -69,7 +69,8 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
         const std::int16_t* const c = ct.voxels.get() + k * nxy + j * nx + i;
         const auto lerp = [](float a, float b, float t) { return a + (b - a) * t; };
         const auto square = [&](const std::int16_t* q) {
-          return lerp(lerp(static_cast<float>(q[0]), static_cast<float>(q[si]), u), lerp(static_cast<float>(q[sj * nx]), static_cast<float>(q[sj * nx + si]), u), v);
+          return lerp(lerp(static_cast<float>(q[0]), static_cast<float>(q[si]), u),
+                      lerp(static_cast<float>(q[sj * nx]), static_cast<float>(q[sj * nx + si]), u), v);
         };
         const float hu = w == 0 ? square(c) : lerp(square(c), square(c + sk * nxy), w);
         const auto g = static_cast<std::uint32_t>(std::clamp((static_cast<double>(hu) - black) * scale, 0.0, 255.0));
@@ -77,7 +78,8 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
         const int ni = static_cast<int>(at.x + 0.5), nj = static_cast<int>(at.y + 0.5), nk = static_cast<int>(at.z + 0.5);
         unsigned is = document.bone().at(ni, nj, nk) ? 1U : 0U;
         if (look.live && static_cast<double>(hu) >= look.live->lower_hu && static_cast<double>(hu) <= look.live->upper_hu) is |= 2U;
-        if (const std::uint8_t label = labels[static_cast<std::size_t>(nk * nxy + nj * nx + ni)]; label != 0 && shown[label] != nullptr) is |= static_cast<unsigned>(label) << 8;
+        if (const std::uint8_t label = labels[static_cast<std::size_t>(nk * nxy + nj * nx + ni)]; label != 0 && shown[label] != nullptr)
+          is |= static_cast<unsigned>(label) << 8;
         what[p] = static_cast<What>(is);
       }
     }

@@ -39,8 +39,8 @@ constexpr std::array<std::array<int, 3>, 8> kColours{
 
 std::string place_text(Vec3 p) {
   char text[96];
-  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x), p.y >= 0 ? 'P' : 'A', std::abs(p.y), p.z >= 0 ? 'H' : 'F',
-                std::abs(p.z));
+  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x), p.y >= 0 ? 'P' : 'A', std::abs(p.y),
+                p.z >= 0 ? 'H' : 'F', std::abs(p.z));
   return text;
 }
 
@@ -48,9 +48,18 @@ std::string volume_text(double mm3) {
   return mm3 >= 1000 ? rounded(mm3 / 1000) + " cm3" : rounded(mm3) + " mm3";
 }
 
-EditControl::EditControl(EditDocument& document) : document_(document), saved_version_(document.version()), drawn_version_(document.version()) {
+EditControl::EditControl(EditDocument& document)
+    : document_(document), saved_version_(document.version()), drawn_version_(document.version()) {
   for (std::size_t v = 0; v < 3; ++v) views_[v].plane = static_cast<Plane>(v);
   cross_mm_ = document_.ct().frame.centre_mm();
+  // Where the threshold stands: the lowest value in bone, or what was set last.
+  const Image& ct = document_.ct();
+  int lowest = 32767;
+  for (const Run& r : document_.bone().runs(true)) {
+    const std::int16_t* const row = ct.voxels.get() + static_cast<std::size_t>(r.row) * static_cast<std::size_t>(ct.frame.dims[0]);
+    lowest = std::min(lowest, static_cast<int>(*std::min_element(row + r.begin, row + r.end)));
+  }
+  if (lowest < 32767) lower_hu = lowest;
   for (const Operation& o : document_.operations()) {
     if (const auto* const t = std::get_if<ThresholdEdit>(&o)) {
       lower_hu = t->lower_hu;
@@ -84,7 +93,8 @@ void EditControl::fit() {
   const Frame& f = document_.ct().frame;
   Vec3 lo = f.centre_mm(), hi = lo;
   for (int c = 0; c < 8; ++c) {
-    const Vec3 p = f.world_from_index({(c & 1) != 0 ? f.dims[0] - 0.5 : -0.5, (c & 2) != 0 ? f.dims[1] - 0.5 : -0.5, (c & 4) != 0 ? f.dims[2] - 0.5 : -0.5});
+    const Vec3 p = f.world_from_index(
+        {(c & 1) != 0 ? f.dims[0] - 0.5 : -0.5, (c & 2) != 0 ? f.dims[1] - 0.5 : -0.5, (c & 4) != 0 ? f.dims[2] - 0.5 : -0.5});
     for (std::size_t a = 0; a < 3; ++a) {
       lo[a] = std::min(lo[a], p[a]);
       hi[a] = std::max(hi[a], p[a]);
@@ -491,7 +501,7 @@ void EditControl::ask_preview() {
   if (busy() || document_.in_stroke() || (same_live && preview_version_ == document_.version())) return;
   preview_live_ = wanted;
   preview_version_ = document_.version();
-  PreviewRequest request{document_.ct(), wanted, nullptr, {}};
+  PreviewRequest request{document_.ct(), wanted, nullptr, {}, preview_voxels};
   if (!wanted) request.bone = std::make_shared<const BitMask>(document_.bone());
   for (const EditStructure& s : document_.structures()) {
     const EditDocument::Bounds b = document_.bounds(s.is.value);

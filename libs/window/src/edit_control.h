@@ -45,6 +45,9 @@ class EditControl {
   double window_hu = 1000, level_hu = 400;
   bool show_cross = true, show_outlines = true, show_help = false;
 
+  /// Of the picture in 3D: fewer where triangles are drawn without a graphics card.
+  std::size_t preview_voxels = 3'000'000;
+
   // --- mouse --------------------------------------------------------------------------------------------------------------------------
   void press(EditPointer at, EditButton button);
   /// Also without a button.

@@ -81,7 +81,8 @@ constexpr GreyPreset kPresets[] = {{"Bone", 1000, 400}, {"Soft tissue", 350, 40}
 }  // namespace
 
 const char* edit_tool_name(EditTool tool) {
-  static constexpr const char* names[kEditTools] = {"Look", "Ruler", "Threshold", "Piece", "Small pieces", "Box", "Fill", "Smooth", "Brush", "Eraser"};
+  static constexpr const char* names[kEditTools] = {"Look", "Ruler", "Threshold", "Piece", "Small pieces",
+                                                    "Box",  "Fill",  "Smooth",    "Brush", "Eraser"};
   return names[static_cast<int>(tool)];
 }
 
@@ -91,7 +92,8 @@ std::span<const EditKeyRow> edit_key_table() {
 
 const EditKeyRow* find_edit_key(int code, bool control, bool shift) {
   const With with = control ? (shift ? With::control_shift : With::control) : shift ? With::shift : With::nothing;
-  const auto* const at = std::find_if(std::begin(kRows), std::end(kRows), [&](const EditKeyRow& k) { return k.code == code && k.with == with; });
+  const auto* const at =
+      std::find_if(std::begin(kRows), std::end(kRows), [&](const EditKeyRow& k) { return k.code == code && k.with == with; });
   return at == std::end(kRows) ? nullptr : at;
 }
 

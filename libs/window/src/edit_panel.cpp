@@ -25,7 +25,8 @@ bool wide_button(const char* text, bool enabled = true) {
 bool slider(const char* name, double& value, double lo, double hi, const char* format, bool logarithmic = false) {
   auto v = static_cast<float>(value);
   ImGui::SetNextItemWidth(-1);
-  const bool changed = ImGui::SliderFloat(name, &v, static_cast<float>(lo), static_cast<float>(hi), format, logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+  const bool changed =
+      ImGui::SliderFloat(name, &v, static_cast<float>(lo), static_cast<float>(hi), format, logarithmic ? ImGuiSliderFlags_Logarithmic : 0);
   if (changed) value = std::clamp(static_cast<double>(v), lo, hi);
   return changed;
 }
@@ -40,6 +41,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   // What is always needed stays at the bottom, whatever is above it.
   const float line = ImGui::GetFontSize() * 1.9F + ImGui::GetStyle().ItemSpacing.y;
   ImGui::BeginChild("upper", {0, height - 3 * line - 3 * ImGui::GetStyle().WindowPadding.y});
+  slider_ = {};
   tools(control, scale);
   options(control);
   heading("Grey values");
@@ -52,7 +54,8 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
       EditKeyRow row{0, EditKey::preset, static_cast<int>(i)};
       control.key(row);
     }
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s: window %.0f, level %.0f (F%d)", p.name, p.window_hu, p.level_hu, static_cast<int>(i) + 2);
+    if (ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s: window %.0f, level %.0f (F%d)", p.name, p.window_hu, p.level_hu, static_cast<int>(i) + 2);
   }
   structures(control, scale);
   ImGui::EndChild();
@@ -70,7 +73,10 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   ImGui::EndDisabled();
   const bool unsaved = control.unsaved();
   if (unsaved) ImGui::PushStyleColor(ImGuiCol_Button, {0.16F, 0.45F, 0.28F, 1});
-  wishes.save = wide_button(saving ? "Saving ..." : unsaved ? "Save into the case (Ctrl-S)" : "Saved", unsaved && !saving && !control.busy());
+  wishes.save = wide_button(saving    ? "Saving ..."
+                            : unsaved ? "Save into the case (Ctrl-S)"
+                                      : "Saved",
+                            unsaved && !saving && !control.busy());
   if (unsaved) ImGui::PopStyleColor();
   if (ImGui::Button("Help (F1)", {half, tall})) control.show_help = !control.show_help;
   ImGui::SameLine();
@@ -112,10 +118,13 @@ void EditPanel::options(EditControl& control) {
       heading(title.c_str());
       double lower = control.lower_hu, upper = std::min(control.upper_hu, 4000.0);
       bool changed = slider("##lower", lower, -500, 2500, "from %.0f HU");
+      const ImVec2 lo = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+      slider_ = {lo.x, lo.y, size.x, size.y};
       const bool top = slider("##upper", upper, 0, 4000, upper >= 4000 ? "no upper end" : "to %.0f HU");
       if (changed || top) control.set_threshold(lower, upper >= 4000 ? 32767 : upper);
       ImGui::Checkbox("do later steps again", &control.later_steps_again);
-      if (ImGui::IsItemHovered()) ImGui::SetTooltip("what was done since the last threshold is done again on the new one; else it is forgotten");
+      if (ImGui::IsItemHovered())
+        ImGui::SetTooltip("what was done since the last threshold is done again on the new one; else it is forgotten");
       if (wide_button("Apply (Enter)", free)) control.apply();
       return;
     }
@@ -155,7 +164,8 @@ void EditPanel::options(EditControl& control) {
       double diameter = 2 * control.brush_radius_mm;
       if (slider("##size", diameter, 0.4, 60, "ball of %.1f mm", true)) control.brush_radius_mm = diameter / 2;
       const EditStructure* const s = control.document().structure(control.structure);
-      ImGui::TextWrapped("%s %s (choose below)", control.tool() == EditTool::brush ? "adds to" : "takes from", s != nullptr ? s->is.name.c_str() : "bone");
+      ImGui::TextWrapped("%s %s (choose below)", control.tool() == EditTool::brush ? "adds to" : "takes from",
+                         s != nullptr ? s->is.name.c_str() : "bone");
       return;
     }
   }
@@ -215,7 +225,8 @@ void EditPanel::structures(EditControl& control, float scale) {
     }
   }
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - 64 * scale);
-  const bool entered = ImGui::InputTextWithHint("##new", "new structure", new_name_.data(), new_name_.size(), ImGuiInputTextFlags_EnterReturnsTrue);
+  const bool entered =
+      ImGui::InputTextWithHint("##new", "new structure", new_name_.data(), new_name_.size(), ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::SameLine();
   if ((ImGui::Button("Add", {-1, 0}) || entered) && new_name_[0] != 0 && control.add_structure(new_name_.data())) new_name_.fill(0);
 }

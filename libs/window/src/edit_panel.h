@@ -15,6 +15,8 @@ class EditPanel {
   };
   /// Between ImGui::NewFrame and Render. `scale`: of the text, against 96 dots an inch.
   Wishes draw(EditControl& control, float width, float height, float scale, bool saving);
+  /// Where the slider of the lower threshold was drawn last, for tests: x, y, width, height; no width: it was not.
+  [[nodiscard]] const std::array<float, 4>& threshold_slider() const { return slider_; }
 
  private:
   void tools(EditControl& control, float scale);
@@ -24,6 +26,7 @@ class EditPanel {
   int named_ = -1;  // whose name stands in name_
   std::array<float, 3> colour_{};
   int coloured_ = -1;
+  std::array<float, 4> slider_{};
 };
 
 }  // namespace osteo

@@ -77,6 +77,7 @@ void EditScene::show(const Preview& preview) {
   }
   // Bone hides what lies in it: with structures it is a veil.
   s.bone->GetProperty()->SetOpacity(preview.structures.empty() ? 1 : 0.45);
+  s.bone->GetProperty()->SetBackfaceCulling(preview.structures.empty() ? 0 : 1);
   if (!s.looked) s.look();
   s.dirty = true;
 }

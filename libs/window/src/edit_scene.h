@@ -18,10 +18,11 @@ class EditScene {
   void show(const Preview& preview);
   /// Looks from a side (unit, LPS) at all of it.
   void look_from(Vec3 eye);
-  void turn(double dx, double dy);    ///< pixels
+  void turn(double dx, double dy);  ///< pixels
   void shift(double dx, double dy);
   void zoom(double factor);
-  /// The lower left `width` x `height` pixels of the back buffer are overwritten when it has to be drawn. The texture stays the scene's own.
+  /// The lower left `width` x `height` pixels of the back buffer are overwritten when it has to be drawn. The texture stays the scene's
+  /// own.
   [[nodiscard]] unsigned texture(int width, int height);
   /// Where a point of the world lies in the picture, from its upper left corner; as last drawn.
   [[nodiscard]] std::array<double, 2> pixel(Vec3 world_mm);

@@ -20,7 +20,8 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
     views.push_back(std::move(view));
   }
   Json structures = Json::list();
-  for (const EditStructure& e : control.document().structures()) structures.push_back({{"value", e.is.value}, {"name", e.is.name}, {"shown", e.shown}});
+  for (const EditStructure& e : control.document().structures())
+    structures.push_back({{"value", e.is.value}, {"name", e.is.name}, {"shown", e.shown}});
   const EditDocument& d = control.document();
   const Json j{{"pictures", s.pictures},
                {"size", {s.width, s.height}},
@@ -46,6 +47,7 @@ void write_edit_state(const EditWindowState& s, const EditControl& control, cons
                {"help", control.show_help},
                {"structures", std::move(structures)},
                {"triangles", s.triangles},
+               {"threshold_slider", s.threshold_slider},
                {"worst_ms", s.worst_ms}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';

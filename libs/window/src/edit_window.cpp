@@ -41,6 +41,9 @@ class EditWindow {
       glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     }
     glBindTexture(GL_TEXTURE_2D, 0);
+    const auto* const renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    const std::string name = renderer != nullptr ? renderer : "";
+    if (name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos) control_.preview_voxels = 500'000;
     control_.say("F1 shows what mouse and keys do");
   }
 
@@ -98,7 +101,8 @@ class EditWindow {
     static std::string reason;
     glfwSetErrorCallback([](int, const char* text) { reason = text; });
     if (glfwInit() == GLFW_FALSE)
-      throw Error(ExitCode::failed, "no window can be opened: " + reason, "is there a display? Without one: osteo edit CASE --apply edits.json");
+      throw Error(ExitCode::failed, "no window can be opened: " + reason,
+                  "is there a display? Without one: osteo edit CASE --apply edits.json");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -152,7 +156,8 @@ class EditWindow {
     ImGuiIO& io = ImGui::GetIO();
     io.Fonts->Clear();
     const float size = std::round(17 * scale_);
-    const char* const fonts[] = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", "/usr/share/fonts/truetype/liberation/LiberationSans-Regular.ttf",
+    const char* const fonts[] = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
+                                 "/usr/share/fonts/truetype/liberation/LiberationSans-Regular.ttf",
                                  "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf"};
     ImFont* font = nullptr;
     for (const char* const file : fonts) {
@@ -230,7 +235,8 @@ class EditWindow {
     if (++pictures_ > 3) worst_ms_ = std::max(worst_ms_, ms);  // the first ones compile shaders
     glfwSwapBuffers(window_);
     if (!state_file_.empty()) {
-      EditWindowState state{pictures_, width_, height_, boxes_, saving_, asking_, worst_ms_, scene_->triangles()};
+      EditWindowState state{
+          pictures_, width_, height_, boxes_, saving_, asking_, worst_ms_, scene_->triangles(), panel_.threshold_slider()};
       write_edit_state(state, control_, state_file_);
     }
   }
@@ -280,7 +286,9 @@ class EditWindow {
     for (const Event& e : std::exchange(events_, {})) {
       const int view = dragging_ >= 0 ? dragging_ : control_.show_help && io.WantCaptureMouse ? -1 : view_at(e.x, e.y);
       const EditPointer at = pointer(e.x, e.y, view);
-      const EditButton button = e.code == GLFW_MOUSE_BUTTON_LEFT ? EditButton::left : e.code == GLFW_MOUSE_BUTTON_RIGHT ? EditButton::right : EditButton::middle;
+      const EditButton button = e.code == GLFW_MOUSE_BUTTON_LEFT    ? EditButton::left
+                                : e.code == GLFW_MOUSE_BUTTON_RIGHT ? EditButton::right
+                                                                    : EditButton::middle;
       switch (e.kind) {
         case Event::Kind::move:
           if (dragging_ == kView3D) {
@@ -297,7 +305,8 @@ class EditWindow {
         case Event::Kind::press: {
           if (view < 0) break;
           const Clock::time_point now = Clock::now();
-          const bool twice = button == EditButton::left && std::chrono::duration<double>(now - last_press_).count() < 0.4 && std::abs(e.x - press_x_) < 6 && std::abs(e.y - press_y_) < 6;
+          const bool twice = button == EditButton::left && std::chrono::duration<double>(now - last_press_).count() < 0.4 &&
+                             std::abs(e.x - press_x_) < 6 && std::abs(e.y - press_y_) < 6;
           last_press_ = twice ? Clock::time_point() : now;
           press_x_ = drag_x_ = e.x;
           press_y_ = drag_y_ = e.y;
@@ -374,7 +383,8 @@ class EditWindow {
         glBindTexture(GL_TEXTURE_2D, 0);
       }
       drawn_[static_cast<std::size_t>(v)] = {b.width, b.height};
-      const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)}, hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
+      const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)},
+          hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
       draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(textures_[static_cast<std::size_t>(v)])), lo, hi);
       draw->PushClipRect(lo, hi);
       annotate(draw, v, lo);
@@ -388,7 +398,8 @@ class EditWindow {
     const EditViewBox& b = boxes_[kView3D];
     if (b.width > 0) {
       const unsigned texture = scene_->texture(b.width, b.height);
-      const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)}, hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
+      const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)},
+          hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
       draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture)), lo, hi, {0, 1}, {1, 0});
       draw->PushClipRect(lo, hi);
       if (control_.show_cross) {
@@ -396,7 +407,10 @@ class EditWindow {
         const ImVec2 c{lo.x + static_cast<float>(p[0]), lo.y + static_cast<float>(p[1])};
         draw->AddCircle(c, 7 * scale_, kCross, 0, 2 * scale_);
       }
-      text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_}, control_.previewing() ? "3D preview, being made ..." : control_.live() ? "3D preview of the threshold" : "3D preview, coarse");
+      text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
+           control_.previewing() ? "3D preview, being made ..."
+           : control_.live()     ? "3D preview of the threshold"
+                                 : "3D preview, coarse");
       draw->PopClipRect();
     }
   }
@@ -424,7 +438,8 @@ class EditWindow {
     static constexpr const char* names[] = {"Axial", "Coronal", "Sagittal"};
     static constexpr const char* letters[] = {"RLAP", "RLHF", "APHF"};  // left, right, top, bottom
     const auto [slice, slices] = control_.slice(v);
-    text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_}, std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
+    text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
+         std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
     const float line = ImGui::GetFontSize();
     const ImU32 ink = IM_COL32(255, 225, 140, 255);
     const auto letter = [&](int i) { return std::string(1, letters[v][i]); };
@@ -470,8 +485,8 @@ class EditWindow {
       const Vec3 n = cross(view.world(1, 0) - view.world(0, 0), view.world(0, 1) - view.world(0, 0));
       const double off = dot(m - view.through_mm, normalized(n)), r2 = control_.brush_radius_mm * control_.brush_radius_mm - off * off;
       if (r2 > 0)
-        draw->AddCircle(place(m), static_cast<float>(std::sqrt(r2) / view.mm_per_pixel), control_.tool() == EditTool::brush ? IM_COL32(120, 255, 120, 255) : IM_COL32(255, 120, 120, 255),
-                        0, 1.5F * scale_);
+        draw->AddCircle(place(m), static_cast<float>(std::sqrt(r2) / view.mm_per_pixel),
+                        control_.tool() == EditTool::brush ? IM_COL32(120, 255, 120, 255) : IM_COL32(255, 120, 120, 255), 0, 1.5F * scale_);
     }
   }
 
@@ -506,12 +521,19 @@ class EditWindow {
       ImGui::TextWrapped("%s", l.text);
     }
     ImGui::Separator();
-    ImGui::TextWrapped("Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that follows from it.");
+    ImGui::TextWrapped(
+        "Everything can be undone. The scan is never changed; what is saved is what was done, and the bone that follows from it.");
     ImGui::End();
   }
 
   void ask() {
-    events_.clear();
+    bool save_now = false, discard = false, go_on = false;
+    for (const Event& e : std::exchange(events_, {})) {
+      if (e.kind != Event::Kind::key) continue;
+      save_now = save_now || e.code == GLFW_KEY_ENTER;
+      discard = discard || e.code == GLFW_KEY_D;
+      go_on = go_on || e.code == GLFW_KEY_ESCAPE;
+    }
     const float w = 440 * scale_;
     ImGui::SetNextWindowPos({(static_cast<float>(width_) - w) / 2, static_cast<float>(height_) / 3});
     ImGui::SetNextWindowSize({w, 0});
@@ -520,15 +542,19 @@ class EditWindow {
     ImGui::TextWrapped("%s", saving_ ? "It is being saved." : "There are corrections that are not saved.");
     const ImVec2 size{-1, ImGui::GetFontSize() * 1.9F};
     if (saving_) {
-      close_after_save_ = true;
-      if (ImGui::Button("Do not wait: close when it is saved", size)) asking_ = false;
-    } else if (ImGui::Button("Save and close", size)) {
-      save();
-      close_after_save_ = saving_;
-      asking_ = false;
+      if (ImGui::Button("Close when it is saved (Enter)", size) || save_now) {
+        close_after_save_ = true;
+        asking_ = false;
+      }
+    } else {
+      if (ImGui::Button("Save and close (Enter)", size) || save_now) {
+        save();
+        close_after_save_ = saving_;
+        asking_ = false;
+      }
+      if (ImGui::Button("Close without saving (D)", size) || discard) quit_ = true;
     }
-    if (!saving_ && ImGui::Button("Close without saving", size)) quit_ = true;
-    if (ImGui::Button("Go on editing", size)) {
+    if (ImGui::Button("Go on editing (Esc)", size) || go_on) {
       asking_ = false;
       close_after_save_ = false;
     }

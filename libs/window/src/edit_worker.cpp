@@ -11,7 +11,8 @@ namespace {
 TriMesh surface_of(const CoarseMask& coarse_mask, const Context& context) {
   const auto& d = coarse_mask.frame.dims;
   const auto value = [&](int i, int j, int k) {
-    return coarse_mask.filled[(static_cast<std::size_t>(k) * static_cast<std::size_t>(d[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(d[0]) +
+    return coarse_mask.filled[(static_cast<std::size_t>(k) * static_cast<std::size_t>(d[1]) + static_cast<std::size_t>(j)) *
+                                  static_cast<std::size_t>(d[0]) +
                               static_cast<std::size_t>(i)];
   };
   std::vector<Ijk> bricks;

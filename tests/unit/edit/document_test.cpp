@@ -58,7 +58,8 @@ TEST(BitMask, CoarseKeepsTheVolume) {
     EXPECT_EQ(c.filled, same.filled);
     double sum = 0;
     for (const float f : c.filled) sum += static_cast<double>(f);
-    EXPECT_NEAR(sum * c.frame.voxel_volume_mm3(), static_cast<double>(mask.count()) * ct.frame.voxel_volume_mm3(), 1e-3 * static_cast<double>(mask.count()));
+    EXPECT_NEAR(sum * c.frame.voxel_volume_mm3(), static_cast<double>(mask.count()) * ct.frame.voxel_volume_mm3(),
+                1e-3 * static_cast<double>(mask.count()));
   }
 }
 
@@ -86,7 +87,8 @@ TEST(EditDocument, BrushIsTheBallThatWasAskedFor) {
       }
     }
     EXPECT_GT(n, 300U);
-    EXPECT_NEAR(done.added_mm3, static_cast<double>(n) * frame.voxel_volume_mm3(), static_cast<double>(doubtful) * frame.voxel_volume_mm3() + 1e-9);
+    EXPECT_NEAR(done.added_mm3, static_cast<double>(n) * frame.voxel_volume_mm3(),
+                static_cast<double>(doubtful) * frame.voxel_volume_mm3() + 1e-9);
     // Drawn live, dab by dab, it is the same.
     EditDocument live(ct, start_of(ct, 300));
     live.begin_stroke(BrushEdit{0, false, 3.2, {}});
@@ -156,8 +158,8 @@ TEST(EditDocument, FillsWhatIsEnclosedAndNotLarger) {
   EditDocument d(ct, start_of(ct, 300));
   d.apply(BrushEdit{0, false, 9, {{12, 12, 12}, {36, 12, 12}}});
   const double solid = d.volume_mm3(0);
-  d.apply(BrushEdit{0, true, 2, {{12, 12, 12}}});  // 33 mm3
-  d.apply(BrushEdit{0, true, 4, {{30, 12, 12}}});  // 268 mm3
+  d.apply(BrushEdit{0, true, 2, {{12, 12, 12}}});                 // 33 mm3
+  d.apply(BrushEdit{0, true, 4, {{30, 12, 12}}});                 // 268 mm3
   d.apply(BrushEdit{0, true, 1.5, {{21, 12, 12}, {21, 12, 0}}});  // a bay: open to the outside
   const double bay = 2 * M_PI * 1.5 * 1.5;
   const double carved = d.volume_mm3(0);
@@ -185,7 +187,8 @@ TEST(EditDocument, SmoothingIsTheWeightedMajorityAndStaysWithinItsLimit) {
     double total = 1;
     for (std::size_t a = 0; a < 3; ++a) {
       n[a] = static_cast<int>(std::floor(radius / spacing[a] + 1e-9));
-      for (int i = 0; i <= 2 * n[a]; ++i) weight[a].push_back(std::tgamma(2 * n[a] + 1) / (std::tgamma(i + 1) * std::tgamma(2 * n[a] - i + 1)));
+      for (int i = 0; i <= 2 * n[a]; ++i)
+        weight[a].push_back(std::tgamma(2 * n[a] + 1) / (std::tgamma(i + 1) * std::tgamma(2 * n[a] - i + 1)));
       total *= std::pow(4, n[a]);
     }
     for (int k = 0; k < 23; ++k) {
@@ -196,7 +199,8 @@ TEST(EditDocument, SmoothingIsTheWeightedMajorityAndStaysWithinItsLimit) {
             for (int dj = -n[1]; dj <= n[1]; ++dj) {
               for (int di = -n[0]; di <= n[0]; ++di) {
                 const bool in = before.at(std::clamp(i + di, 0, 130), std::clamp(j + dj, 0, 36), std::clamp(k + dk, 0, 22));
-                sum += in ? std::round(weight[0][static_cast<std::size_t>(di + n[0])]) * std::round(weight[1][static_cast<std::size_t>(dj + n[1])]) *
+                sum += in ? std::round(weight[0][static_cast<std::size_t>(di + n[0])]) *
+                                std::round(weight[1][static_cast<std::size_t>(dj + n[1])]) *
                                 std::round(weight[2][static_cast<std::size_t>(dk + n[2])])
                           : 0;
               }
@@ -250,7 +254,8 @@ TEST(EditDocument, StructuresAreAddedPaintedChangedAndDeleted) {
   EXPECT_EQ(d.volume_mm3(1), 0);
   d.undo();
   EXPECT_NEAR(d.volume_mm3(1), painted.added_mm3, 1e-9);
-  while (d.undo()) {}
+  while (d.undo()) {
+  }
   EXPECT_EQ(d.hash(), start);
 }
 
@@ -330,7 +335,8 @@ TEST(EditFile, SavedAndDoneAgainItIsTheSameBitForBit) {
     EXPECT_EQ(again.hash(), d.hash());
     EXPECT_FALSE(again.structures().back().shown);
     EXPECT_EQ(edits_text(recipe_of(again)), text);
-    while (again.undo()) {}
+    while (again.undo()) {
+    }
     EXPECT_EQ(again.hash(), again.start_hash());
   }
 }
@@ -450,7 +456,8 @@ TEST(EditFuzz, UndoToTheStartIsTheStart) {
   const std::string last = d.hash();
   const std::size_t steps = d.steps();
   const std::string file = edits_text(recipe_of(d));
-  while (d.undo()) {}
+  while (d.undo()) {
+  }
   EXPECT_EQ(d.hash(), first);
   std::size_t redone = 0;
   while (d.steps() < steps && d.redo()) ++redone;
@@ -459,7 +466,8 @@ TEST(EditFuzz, UndoToTheStartIsTheStart) {
   EditDocument again(ct, start);
   apply_edits(again, parse_edits(file, "edits.json"));
   EXPECT_EQ(again.hash(), last);
-  if (wanted != nullptr) std::printf("%d actions, %zu steps, history %.1f MB\n", actions, steps, static_cast<double>(d.history_bytes()) / 1e6);
+  if (wanted != nullptr)
+    std::printf("%d actions, %zu steps, history %.1f MB\n", actions, steps, static_cast<double>(d.history_bytes()) / 1e6);
 }
 
 }  // namespace

@@ -34,6 +34,7 @@ struct EditOutcome {
 
 /// A change of bone that is worked out but not made: see EditDocument::plan.
 struct BonePlan;
+class WordChanges;  // private to libs/edit
 
 struct EditLimits {
   /// Of the history. Above it the largest old steps forget what they changed; undoing one of those makes all before it again, from the
@@ -70,10 +71,11 @@ class EditDocument {
   [[nodiscard]] Bounds bounds(int value) const;
   [[nodiscard]] double volume_mm3(int value) const;  ///< 0: bone
 
-  /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and then nothing is done.
+  /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and then nothing is
+  /// done.
   EditOutcome apply(const Operation& operation, const Context& context = {});
-  /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true by `commit`, unless
-  /// the document was changed since (Error(failed)).
+  /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true by `commit`, which
+  /// takes no time, unless the document was changed since (Error(failed)).
   [[nodiscard]] BonePlan plan(std::vector<Operation> operations, const Context& context = {}) const;
   EditOutcome commit(BonePlan plan);
   /// A threshold, and after it all that was done to bone since the last one, or since the beginning: what a new threshold would forget.
@@ -120,8 +122,9 @@ class EditDocument {
 struct BonePlan {
   std::vector<Operation> operations;
   BitMask bone;
-  std::string note;
-  std::uint64_t version = 0;
+  EditOutcome outcome;
+  std::shared_ptr<const WordChanges> changes;
+  std::uint64_t version = 0;  ///< of the document that it was worked out for
 };
 
 /// Content hash of a CT with its grid: what edits are bound to.

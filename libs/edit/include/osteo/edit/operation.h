@@ -76,12 +76,10 @@ struct BoxEdit {
 struct FillEdit {
   static constexpr std::string_view kName = "fill";
   double max_volume_mm3 = 50;
-  static void describe(FillEdit& p, auto& visit) {
-    visit({"max_volume_mm3", "larger cavities stay", "mm3", 0, 1e9}, p.max_volume_mm3);
-  }
+  static void describe(FillEdit& p, auto& visit) { visit({"max_volume_mm3", "larger cavities stay", "mm3", 0, 1e9}, p.max_volume_mm3); }
 };
-/// Each voxel becomes what most of its neighbourhood is, by binomial weights that reach floor(radius / spacing) voxels along each axis, 5 at
-/// most: nothing changes that is farther than the radius, along an axis, from the surface as it was. Walls thinner than that may go.
+/// Each voxel becomes what most of its neighbourhood is, by binomial weights that reach floor(radius / spacing) voxels along each axis, 5
+/// at most: nothing changes that is farther than the radius, along an axis, from the surface as it was. Walls thinner than that may go.
 struct SmoothEdit {
   static constexpr std::string_view kName = "smooth";
   double radius_mm = 1;
