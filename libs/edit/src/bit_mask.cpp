@@ -209,22 +209,7 @@ CoarseMask coarse(const BitMask& mask, const Frame& frame, std::size_t most, int
 }
 
 CoarseMask coarse(const Image& ct, double lower_hu, double upper_hu, std::size_t most, int threads) {
-  const Range range = whole_range(lower_hu, upper_hu);
-  const int nx = ct.frame.dims[0];
-  return gather(ct.frame, most, threads, [&](std::size_t r, int factor, std::vector<std::uint32_t>& sums) {
-    const std::int16_t* const in = ct.voxels.get() + r * static_cast<std::size_t>(nx);
-    std::uint8_t flags[1024];
-    for (int first = 0; first < nx; first += 1024) {
-      const int n = std::min(1024, nx - first);
-      mark_range(in + first, static_cast<std::size_t>(n), range, flags);
-      for (int i = 0; i < n;) {
-        const int cell = (first + i) / factor, stop = std::min(n, (cell + 1) * factor - first);
-        std::uint32_t sum = 0;
-        for (; i < stop; ++i) sum += flags[i];
-        sums[static_cast<std::size_t>(cell)] += sum;
-      }
-    }
-  });
+  return coarse(BitMask(ct, lower_hu, upper_hu, threads), ct.frame, most, threads);
 }
 
 }  // namespace osteo

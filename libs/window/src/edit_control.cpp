@@ -119,7 +119,7 @@ void EditControl::go_to(Vec3 world_mm) {
 
 void EditControl::follow_cross() {
   for (SliceView& v : views_) v.through_mm = cross_mm_;
-  redraw_ = true;
+  if (last_.view >= 0 && last_.view < kView3D) under_mouse_ = world(last_);  // another slice is under it
 }
 
 void EditControl::scroll(int view, int slices) {
@@ -192,12 +192,10 @@ void EditControl::move(EditPointer at) {
   SliceView& v = views_[static_cast<std::size_t>(held_view_)];
   if (*held_ == EditButton::middle) {
     v.centre_mm += v.world(0, 0) - v.world(dx, dy);
-    redraw_ = redraw_ || dx != 0 || dy != 0;
     return;
   }
   if (*held_ == EditButton::right) {
     v.mm_per_pixel = std::clamp(v.mm_per_pixel * std::exp(-dy * 0.01), 0.005, 5.0);
-    redraw_ = redraw_ || dy != 0;
     return;
   }
   const Vec3 p = v.world(at.x, at.y);
@@ -247,7 +245,6 @@ void EditControl::wheel(EditPointer at, double notches) {
     const Vec3 before = v.world(at.x, at.y);
     v.mm_per_pixel = std::clamp(v.mm_per_pixel / std::pow(1.15, notches), 0.005, 5.0);
     v.centre_mm += before - v.world(at.x, at.y);
-    redraw_ = true;
   } else {
     scroll(at.view, notches > 0 ? std::max(1, static_cast<int>(notches)) : std::min(-1, static_cast<int>(notches)));
   }

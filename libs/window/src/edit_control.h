@@ -108,7 +108,7 @@ class EditControl {
     hidden_changed_ = false;
   }
   void show_structure(int value, bool shown);
-  /// Something that a slice shows has changed since the last call.
+  /// What all slices show has changed since the last call, beside where they lie and how they are looked at.
   [[nodiscard]] bool take_redraw() { return std::exchange(redraw_, false); }
 
  private:

@@ -375,14 +375,15 @@ class EditWindow {
     for (int v = 0; v < 3; ++v) {
       const EditViewBox& b = boxes_[static_cast<std::size_t>(v)];
       if (b.width <= 0) continue;
-      if (redraw || drawn_[static_cast<std::size_t>(v)] != std::pair{b.width, b.height}) {
+      std::optional<SliceView>& drawn = drawn_[static_cast<std::size_t>(v)];
+      if (redraw || !drawn || !same_picture(*drawn, control_.view(v))) {
+        drawn = control_.view(v);
         draw_cut(control_.view(v), control_.document(), look, pixels_);
         glBindTexture(GL_TEXTURE_2D, textures_[static_cast<std::size_t>(v)]);
         glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
         glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, b.width, b.height, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels_.data());
         glBindTexture(GL_TEXTURE_2D, 0);
       }
-      drawn_[static_cast<std::size_t>(v)] = {b.width, b.height};
       const ImVec2 lo{static_cast<float>(b.x), static_cast<float>(b.y)},
           hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
       draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(textures_[static_cast<std::size_t>(v)])), lo, hi);
@@ -392,7 +393,7 @@ class EditWindow {
     }
     if (redraw) {
       for (int v = 0; v < 3; ++v) {
-        if (boxes_[static_cast<std::size_t>(v)].width <= 0) drawn_[static_cast<std::size_t>(v)] = {};
+        if (boxes_[static_cast<std::size_t>(v)].width <= 0) drawn_[static_cast<std::size_t>(v)].reset();
       }
     }
     const EditViewBox& b = boxes_[kView3D];
@@ -418,6 +419,17 @@ class EditWindow {
   void text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = kText) const {
     draw->AddText({at.x + 1, at.y + 1}, kShadow, words.c_str());
     draw->AddText(at, ink, words.c_str());
+  }
+
+  // The crosshair may move within a slice, which stays the same.
+  static bool same_picture(const SliceView& a, const SliceView& b) {
+    return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel && length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
+  }
+
+  // A length is drawn where it lies, not where it is foreshortened.
+  static bool lies_in(const SliceView& view, const std::array<Vec3, 2>& line) {
+    const Vec3 n = normalized(cross(view.world(1, 0) - view.world(0, 0), view.world(0, 1) - view.world(0, 0)));
+    return std::abs(dot(line[0] - view.through_mm, n)) < 0.01 && std::abs(dot(line[1] - view.through_mm, n)) < 0.01;
   }
 
   void annotate(ImDrawList* draw, int v, ImVec2 lo) {
@@ -461,7 +473,7 @@ class EditWindow {
     std::snprintf(words, sizeof words, "%.0f mm", mm);
     text(draw, {end.x - bar, end.y - line - 6 * scale_}, words);
 
-    if (control_.ruler_mm) {
+    if (control_.ruler_mm && lies_in(view, *control_.ruler_mm)) {
       const auto& r = *control_.ruler_mm;
       const ImVec2 a = place(r[0]), b = place(r[1]);
       draw->AddLine(a, b, IM_COL32(255, 120, 120, 255), 2 * scale_);
@@ -571,7 +583,7 @@ class EditWindow {
   std::unique_ptr<EditScene> scene_;
   EditPanel panel_;
   std::array<unsigned, 3> textures_{};
-  std::array<std::pair<int, int>, 3> drawn_{};
+  std::array<std::optional<SliceView>, 3> drawn_;
   std::vector<std::uint32_t> pixels_;
   std::array<EditViewBox, 4> boxes_;
   std::vector<Event> events_;

@@ -66,7 +66,7 @@ struct CoarseMask {
 };
 /// Whole voxels are put together so that they are about as long as wide and no more than `most` remain. Same bytes for any threads.
 [[nodiscard]] CoarseMask coarse(const BitMask& mask, const Frame& frame, std::size_t most, int threads = 0);
-/// The same of the voxels between two HU values, without a mask of them.
+/// The same of the voxels between two HU values.
 [[nodiscard]] CoarseMask coarse(const Image& ct, double lower_hu, double upper_hu, std::size_t most, int threads = 0);
 
 }  // namespace osteo
