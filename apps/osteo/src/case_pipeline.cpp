@@ -20,7 +20,7 @@ void pass_threshold_on(Pipeline& pipeline) {
     const auto mask = bone.inputs.find("mask");
     if (bone.stage != "resample" || mask == bone.inputs.end() || bone.params.contains("lower")) continue;
     for (const PipelineNode& n : pipeline.nodes) {
-      if (n.id != mask->second.node || n.stage != "threshold" || !n.params.contains("lower")) continue;
+      if (n.id != mask_before_edits(pipeline, mask->second.node) || n.stage != "threshold" || !n.params.contains("lower")) continue;
       const auto preset = n.params.find("preset");
       if (preset == n.params.end() || preset->second == "fixed") bone.params["lower"] = n.params.at("lower");
     }
@@ -72,7 +72,7 @@ std::string flags_of(const Recipe& recipe) {
 }
 
 Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::path& source, const fs::path& structures, bool as_held,
-                       const fs::path& folder) {
+                       const fs::path& folder, const std::optional<CaseEdits>& edits, bool threshold_asked) {
   std::map<std::string, std::string> settings = recipe.settings;
   settings.erase("names");
   settings["source"] = source.string();
@@ -95,6 +95,7 @@ Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const fs::
       if (n.id == "preview") n.inputs["mask"].node = "structures";
     }
   }
+  if (edits) add_edits(pipeline, *edits, folder, threshold_asked);
   pass_threshold_on(pipeline);
   return pipeline;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "case_edits.h"
 #include "osteo/case_report/case_report.h"
 #include "osteo/cli/command.h"
 #include "osteo/pipeline/pipeline.h"
@@ -20,8 +21,10 @@ namespace osteo {
 [[nodiscard]] std::string flags_of(const Recipe& recipe);
 
 /// `text` is the pipeline file's. `structures`: empty where there are none; `as_held`: they are the case's own, names and all.
+/// `edits`: corrections by hand; `threshold_asked` as add_edits() has it.
 [[nodiscard]] Pipeline case_pipeline(const std::string& text, const Recipe& recipe, const std::filesystem::path& source,
-                                     const std::filesystem::path& structures, bool as_held, const std::filesystem::path& folder);
+                                     const std::filesystem::path& structures, bool as_held, const std::filesystem::path& folder,
+                                     const std::optional<CaseEdits>& edits, bool threshold_asked);
 
 /// Keeps the CT and the mask that bone is made from while a pipeline runs; nothing where the pipeline has no such step.
 class ScanKeeper {

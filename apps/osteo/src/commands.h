@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "edit_flags.h"
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
 #include "osteo/haptics/contact.h"
@@ -164,6 +165,7 @@ struct PrepareCommand {
     std::string axes;
     double hu_offset = 0;
     std::string pipeline;
+    std::string edits;
     bool fresh = false;
     bool no_report = false;
   };
@@ -185,6 +187,7 @@ struct PrepareCommand {
     visit({"axes", "where the index axes point, for files that do not know: three letters like LPI"}, p.axes);
     visit({"hu_offset", "added to all values, for a scan that leaves out its offset", "HU", -5000, 5000}, p.hu_offset);
     visit({"pipeline", "another pipeline file than the built-in temporal-bone.json"}, p.pipeline);
+    visit({"edits", "corrections by 'osteo edit' (edits.json), made again on the mask; the case keeps them until --no-edits"}, p.edits);
     visit({"fresh", "forget the flags that the case remembers: only those given now count"}, p.fresh);
     visit({"no_report", "write no report beside the case: its cuts are pictures of the patient"}, p.no_report);
   }
@@ -213,6 +216,18 @@ struct ApproveCommand {
     visit({"by", "name of the person who has looked at the case; kept in the case and in each session"}, p.by);
     visit({"note", "what that person has to say"}, p.note);
     visit({"withdraw", "take the approval back"}, p.withdraw);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct EditCommand {
+  struct Params : EditFlags {
+    std::string apply;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"apply", "without a window: make the corrections of this file (edits.json) again on the case"}, p.apply);
+    EditFlags::describe(p, visit);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ostream>
 
+#include "case_edits.h"
 #include "case_pipeline.h"
 #include "commands.h"
 #include "osteo/base/error.h"
@@ -58,7 +59,7 @@ void set_aside_stale_files(const fs::path& folder, const std::map<std::string, M
 std::map<std::string, std::optional<std::string>> given_now(const std::vector<FieldRef>& fields, const cli::Invocation& io) {
   std::map<std::string, std::optional<std::string>> given;
   const auto own = [](const std::string& name) {
-    return name == "out" || name == "pipeline" || name == "structures" || name == "fresh" || name == "no_report";
+    return name == "out" || name == "pipeline" || name == "structures" || name == "edits" || name == "fresh" || name == "no_report";
   };
   for (const FieldRef& f : fields) {
     const std::string name(f.doc.name), value = f.to_text();
@@ -112,6 +113,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
 
   const auto all_of = [&](const Recipe& r) {
     std::string all = r.structures_hash.empty() ? "" : " --structures";
+    if (!r.edits_hash.empty()) all += " --edits";
     for (const auto& [name, value] : r.settings) all += " " + flag_of(name, value, fields);
     return all.empty() ? " nothing" : all;
   };
@@ -192,7 +194,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (const auto path = recall_file(structures.hash)) {
       structures.path = *path;
     } else if (!given.contains("names") && fs::exists(folder / "structures.seg.nrrd")) {
-      structures.path = folder / "structures.seg.nrrd";
+      structures.path = folder / (fs::exists(folder / kGivenStructures) ? kGivenStructures : "structures.seg.nrrd");
       as_the_case_holds_them = true;
     } else {
       throw Error(ExitCode::no_input,
@@ -207,6 +209,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
                                                       : "--structures: another label map");
   }
   recipe.structures_hash = structures.hash;
+
+  const auto edits = edits_of_case(folder, io.given.contains("edits") ? std::optional(p.edits) : std::nullopt, recipe, notes);
 
   // The settings. One that another pipeline does not have may only be left alone.
   const auto known = pipeline_variables(text);
@@ -241,7 +245,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (names_file || value.find('/') != std::string::npos || without_uid(value) != value) recipe.withheld.insert(name);
   }
 
-  Pipeline pipeline = case_pipeline(text, recipe, source.path, structures.path, as_the_case_holds_them, folder);
+  Pipeline pipeline = case_pipeline(text, recipe, source.path, structures.path, as_the_case_holds_them, folder, edits, given.contains("lower") || given.contains("preset"));
   const std::string name = pipeline.name;
   validate(pipeline, io.registry);
 
@@ -274,6 +278,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     }
     if (!structures.path.empty() && !other_structures)
       kept += as_the_case_holds_them ? " --structures (as the case holds them: their file is not known here)" : " --structures";
+    if (edits && edits->file == folder / "edits.json") kept += " --edits";
     if (!kept.empty()) io.context.info("kept:" + kept + "   (--fresh forgets all, --no-structures and the like drop one)");
   }
 

@@ -37,7 +37,9 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
     text = read_text(*known);
   }
   if (scan.empty() || !recipe->lost.empty()) return std::nullopt;
-  return case_pipeline(text, *recipe, scan, {}, false, folder);
+  Recipe same = *recipe;
+  std::vector<std::string> notes;
+  return case_pipeline(text, *recipe, scan, {}, false, folder, edits_of_case(folder, std::nullopt, same, notes), false);
 }
 
 CaseReport make_report(const fs::path& folder, const std::string& given, cli::Invocation& io) {

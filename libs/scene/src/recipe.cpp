@@ -56,6 +56,7 @@ Json recipe_json(const Recipe& r) {
   Json j{{"source_hash", r.source_hash}};
   if (!r.structures_hash.empty()) j["structures_hash"] = r.structures_hash;
   if (!r.pipeline_hash.empty()) j["pipeline_hash"] = r.pipeline_hash;
+  if (!r.edits_hash.empty()) j["edits_hash"] = r.edits_hash;
   j["settings"] = Json::object();
   for (const auto& [name, value] : r.settings) {
     if (r.withheld.contains(name)) {
@@ -74,7 +75,8 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     const JsonFile m(read_text(file), file.string(), ExitCode::corrupt);
     const JsonValue* const j = m.root().find("recipe");
     if (j == nullptr) return std::nullopt;
-    m.allow(*j, "recipe", std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "settings", "withheld"});
+    m.allow(*j, "recipe",
+            std::vector<std::string>{"source_hash", "structures_hash", "pipeline_hash", "edits_hash", "settings", "withheld"});
     const auto text = [&](const char* key) {
       const JsonValue* const value = j->find(key);
       return value == nullptr ? std::string() : m.text(*value, std::string("recipe: \"") + key + "\"");
@@ -87,6 +89,7 @@ std::optional<Recipe> read_recipe(const fs::path& case_folder) {
     r.source_hash = m.text(m.need(*j, "recipe", "source_hash"), "recipe: \"source_hash\"");
     r.structures_hash = text("structures_hash");
     r.pipeline_hash = text("pipeline_hash");
+    r.edits_hash = text("edits_hash");
     each(&m.need(*j, "recipe", "settings"), [&](const std::string& name, const std::string& value) { r.settings[name] = value; });
     each(j->find("withheld"), [&](const std::string& name, const std::string& hash) {
       if (const auto value = recall(hash)) {

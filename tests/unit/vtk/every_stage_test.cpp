@@ -22,6 +22,7 @@
 #include "osteo/image/phantom.h"
 #include "osteo/image/threshold.h"
 #include "osteo/io/vtk_data.h"
+#include "osteo/stages/edit.h"
 #include "osteo/stages/mesh.h"
 #include "osteo/stages/registry.h"
 #include "osteo/tissue/calibrate.h"
@@ -229,6 +230,14 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
       continue;
     }
     inputs.back() = values().of(port.kinds.front(), text == recipe.texts.end() ? "" : text->second);
+    if (GetParam() == "apply-edits" && port.name == "edits") {  // bound to the CT that it is given
+      const Image& ct = values().image;
+      EditDocument document(ct, values().labels);
+      document.apply(ThresholdEdit{400, 3000});
+      document.apply(AddStructureEdit{1, "nerve", {250, 220, 40}, StructureRole::at_risk});
+      document.apply(BrushEdit{1, false, 5, {ct.frame.centre_mm()}});
+      inputs.back() = Document{edits_text(recipe_of(document))};
+    }
     vtkNew<vtkTrivialProducer> producer;
     producer->SetOutput(as_vtk(inputs.back()));
     filter->SetInputConnection(filter->GetInputPortIndex(port.name), producer->GetOutputPort());

@@ -54,6 +54,9 @@ class CaseUpdate {
 /// Fills in the reports of steps that were not done again, from the manifest that is there, where their keys agree.
 void recall_facts(const std::filesystem::path& folder, std::vector<NodeResult>& results);
 
+/// In a case whose structures were corrected by hand: as they were given, from which the edits begin.
+inline constexpr std::string_view kGivenStructures = "structures-given.seg.nrrd";
+
 struct ManifestFile {
   std::string name;  ///< in the case's folder
   std::string hash;

@@ -1,0 +1,142 @@
+// The window of 'osteo edit', a program of its own.
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <future>
+#include <iostream>
+
+#include "case_scan.h"
+#include "edit_flags.h"
+#include "licence.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/cli/command.h"
+#include "osteo/stages/registry.h"
+#include "osteo/window/edit_window.h"
+
+extern char** environ;
+
+namespace osteo {
+namespace {
+
+// Writes corrections into the case as anyone else does, by 'osteo prepare', beside the window. What it has in memory goes with it.
+class Saver {
+ public:
+  Saver(fs::path case_folder, fs::path scan, int threads) : case_(std::move(case_folder)), scan_(std::move(scan)), threads_(threads) {}
+
+  void begin(const std::string& edits) {
+    running_ = std::async(std::launch::async, [this, edits] { return save(edits); });
+  }
+  std::optional<EditSaved> ended() {
+    if (!running_.valid() || running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+    return running_.get();
+  }
+
+ private:
+  EditSaved save(const std::string& edits) const {
+    try {
+      const TemporaryFolder folder;
+      const fs::path file = folder.path() / "edits.json", said = folder.path() / "said";
+      write_file(file, edits);
+      const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo";
+      std::vector<std::string> args{program.string(), "prepare", scan_.string(), "-o", case_.string(), "--edits", file.string(), "--quiet"};
+      if (threads_ != 0) args.push_back("--threads=" + std::to_string(threads_));
+      const int code = run(args, said);
+      if (code == 0) return {true, "saved into the case: edits.json, bone.vdb, hu.vdb, surface.ply, preview.png, structures"};
+      std::string text = read_text(said);
+      while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+      for (char& c : text) c = c == '\n' ? ' ' : c;
+      return {false, "NOT SAVED, the case is as it was: " + text};
+    } catch (const std::exception& e) {
+      return {false, std::string("NOT SAVED, the case is as it was: ") + e.what()};
+    }
+  }
+
+  static int run(std::vector<std::string>& args, const fs::path& said) {
+    std::vector<char*> argv;
+    for (auto& a : args) argv.push_back(a.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, said.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    pid_t child = 0;
+    const int failed = ::posix_spawn(&child, args[0].c_str(), &actions, nullptr, argv.data(), environ);
+    ::posix_spawn_file_actions_destroy(&actions);
+    if (failed != 0) throw Error(ExitCode::failed, "cannot start '" + args[0] + "': " + std::strerror(failed));
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+  }
+
+  fs::path case_, scan_;
+  int threads_;
+  std::future<EditSaved> running_;
+};
+
+struct EditWindowCommand {
+  using Params = EditFlags;
+  static void describe(Params& p, auto& visit) { EditFlags::describe(p, visit); }
+  static cli::CommandInfo info() {
+    return {"edit",
+            "correct the bone and the structures of a case by hand",
+            "What 'osteo edit CASE' opens.",
+            {{"case", "a folder made by prepare"}},
+            "osteo-edit CASE"};
+  }
+
+  static int run(const Params& p, cli::Invocation& io) {
+    const fs::path folder = io.arguments[0];
+    std::optional<CaseScan> scan = open_case_scan(folder, p.scan, osteo_stages(), io.context);
+    EditDocument document(scan->ct, scan->mask, scan->structures ? &*scan->structures : nullptr);
+    const fs::path source = scan->scan;
+    const std::optional<EditRecipe> edits = scan->edits;
+    scan.reset();
+    if (edits) apply_edits(document, *edits, io.context);
+    io.end_progress();
+    if (!io.common.quiet) {
+      io.err << "open: " << document.ct().frame.dims[0] << " x " << document.ct().frame.dims[1] << " x " << document.ct().frame.dims[2]
+             << " voxels" << (edits ? ", " + std::to_string(edits->operations.size()) + " earlier corrections" : std::string())
+             << std::endl;
+    }
+    EditWindowOptions options;
+    options.width = p.width;
+    options.height = p.height;
+    options.title = "Osteotome edit - " + folder.filename().string();
+    options.state_file = p.state_file;
+    Saver saver(folder, source, io.common.threads);
+    EditWindowActions actions;
+    actions.save = [&](const std::string& text) { saver.begin(text); };
+    actions.saved = [&] { return saver.ended(); };
+    actions.stop = [&] { return io.context.cancelled(); };
+    const int gl_errors = run_edit_window(document, options, actions);
+    if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; what was not saved is lost");
+    if (gl_errors > 0) {
+      throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen",
+                  "please report this with the name of the graphics card");
+    }
+    return 0;
+  }
+};
+
+}  // namespace
+}  // namespace osteo
+
+int main(int argc, char** argv) {
+  osteo::cli::Program program;
+  program.about = "osteo-edit: correct the bone and the structures of a case by hand";
+  program.licence = osteo::licence_of_all_stages();
+  program.add<osteo::EditWindowCommand>();
+  // The only command needs no name.
+  std::vector<char*> args{argv[0]};
+  static char name[] = "edit";
+  const std::string_view first = argc > 1 ? argv[1] : "";
+  if (first != "--version" && first != "help") args.push_back(name);
+  args.insert(args.end(), argv + 1, argv + argc);
+  return osteo::cli::run_program(program, static_cast<int>(args.size()), args.data(), std::cout, std::cerr);
+}

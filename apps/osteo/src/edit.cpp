@@ -1,0 +1,66 @@
+// edit: a case corrected by hand, in a window or from a file.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/scene/case.h"
+
+namespace osteo {
+
+cli::CommandInfo EditCommand::info() {
+  return {
+      "edit",
+      "correct the bone and the structures of a case by hand",
+      "Opens a window with three slices and the bone in 3D: threshold, pieces, box, filling, smoothing, brush and eraser, structures, with "
+      "undo. Saving writes edits.json into the case, which holds what was done and no voxel of the scan, and makes the case's bone anew "
+      "from it; prepare keeps it from then on. With --apply the same without a window, from a file. The scan is never changed.",
+      {{"case", "a folder made by prepare"}},
+      "osteo edit CASE"};
+}
+
+int EditCommand::run(const Params& p, cli::Invocation& io) {
+  const fs::path folder = io.arguments[0];
+  if (!output_exists(folder / "manifest.json")) {
+    throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a prepared case: it has no manifest.json",
+                "make one with: osteo prepare CT -o " + folder.string());
+  }
+  if (!p.apply.empty()) {
+    for (const char* const name : {"width", "height", "state_file"}) {
+      if (io.given.contains(name)) throw Error(ExitCode::usage, "--apply opens no window, so --" + std::string(name) + " does nothing");
+    }
+    // As prepare does it, with one thing changed.
+    PrepareCommand::Params prepare;
+    prepare.out = folder.string();
+    prepare.edits = p.apply;
+    cli::Invocation call = io;
+    call.given = {"out", "edits"};
+    call.arguments.clear();
+    if (!p.scan.empty()) call.arguments.push_back(p.scan);
+    return PrepareCommand::run(prepare, call);
+  }
+  // The window is a program of its own, so that servers need neither GLFW nor a display.
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-edit";
+  if (!fs::exists(program)) {
+    throw Error(ExitCode::failed, "this build has no window (osteo-edit is missing)",
+                "build with -DOSTEO_WINDOW=ON, or use --apply edits.json");
+  }
+  std::vector<std::string> args{program.string(), folder.string()};
+  EditFlags flags = p, defaults;
+  const auto usual = fields_of<EditFlags>(defaults), given = fields_of<EditFlags>(flags);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i].to_text() != usual[i].to_text()) args.push_back(given[i].flag() + "=" + given[i].to_text());
+  }
+  if (io.common.quiet) args.emplace_back("--quiet");
+  if (io.common.threads != 0) args.push_back("--threads=" + std::to_string(io.common.threads));
+  std::vector<char*> argv;
+  for (auto& a : args) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  ::execv(program.c_str(), argv.data());
+  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+}
+
+}  // namespace osteo

@@ -1,0 +1,247 @@
+#!/usr/bin/env python3
+"""Drives the editor under Xvfb and checks each effect, down to the voxels that the saved corrections give. Waits for what it wants to see.
+usage: drive_edit.py BIN_DIR WORK_DIR"""
+import array, gzip, json, os, pathlib, re, shutil, subprocess, sys, time
+
+bin_dir, work = pathlib.Path(sys.argv[1]).absolute(), pathlib.Path(sys.argv[2]).absolute()
+PATIENCE_S = 240
+
+
+def osteo(*args, code=0):
+    done = subprocess.run([bin_dir / "osteo", *map(str, args)], capture_output=True, text=True)
+    assert done.returncode == code, (args, done.returncode, done.stderr)
+    return done.stdout + done.stderr
+
+
+def wait(what, condition):
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        found = condition()
+        if found:
+            return found
+        assert time.monotonic() < end, f"waited in vain: {what}"
+        time.sleep(0.03)
+
+
+class Screen:
+    def __init__(self, size):
+        self.size = size
+
+    def __enter__(self):
+        read, write = os.pipe()
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{self.size}x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as f:
+            os.environ["DISPLAY"] = ":" + f.readline().strip()
+        return self
+
+    def __exit__(self, *_):
+        self.server.kill()
+        self.server.wait()
+
+
+class Window:
+    def __init__(self, *args, case="case"):
+        self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
+        self.log = open(f"{self.file}.log", "w+")
+        self.app = subprocess.Popen([bin_dir / "osteo-edit", case, "--state-file", self.file, *map(str, args)], stderr=self.log)
+        wait("the first picture", lambda: self.file.exists() or self.app.poll() is not None)
+        assert self.app.poll() is None, (self.app.returncode, self.said())
+        wait("the window", lambda: self.x("search", "--name", "^Osteotome edit").split())
+        self.x("mousemove", *self.place(0, 0.5, 0.5))
+        self.until("3D", lambda s: s["triangles"] > 0 and not s["previewing"])
+
+    def x(self, *args):
+        return subprocess.run(["xdotool", *map(str, args)], capture_output=True, text=True).stdout
+
+    def said(self):
+        self.log.flush()
+        return pathlib.Path(self.log.name).read_text()
+
+    def state(self):
+        return json.loads(self.file.read_text())
+
+    def until(self, what, condition):
+        last = {}
+
+        def look():
+            nonlocal last
+            assert self.app.poll() is None, (what, self.app.returncode, self.said())
+            last = self.state()
+            return condition(last) and last
+
+        try:
+            return wait(what, look)
+        except AssertionError as e:
+            raise AssertionError(f"{e}; {last}; {self.said()}") from None
+
+    def key(self, key, what, condition):
+        self.x("key", key)
+        return self.until(f"{key}: {what}", condition)
+
+    def place(self, view, across, down):
+        v = self.state()["views"][view]
+        return round(v["x"] + across * v["width"]), round(v["y"] + down * v["height"])
+
+    def shown(self):
+        """So that what was done with the mouse is known to be seen."""
+        n = self.state()["pictures"]
+        return self.until("next picture", lambda s: s["pictures"] > n)
+
+    def drag(self, begin, end, button=1):
+        self.x("mousemove", *begin)
+        self.shown()
+        self.x("mousedown", button)
+        self.shown()
+        self.x("mousemove", *end)
+        self.shown()
+        self.x("mouseup", button)
+        return self.shown()
+
+    def end(self, code=0):
+        self.app.wait(PATIENCE_S)
+        assert self.app.returncode == code, (self.app.returncode, self.said())
+
+
+def nrrd(path):
+    data = pathlib.Path(path).read_bytes()
+    head, body = data.split(b"\n\n", 1)
+    fields = dict(line.split(": ", 1) for line in head.decode().splitlines() if ": " in line)
+    if fields["encoding"].startswith("gz"):
+        body = gzip.decompress(body)
+    sizes = [int(n) for n in fields["sizes"].split()]
+    values = array.array("h" if fields["type"] in ("short", "int16", "signed short") else "B")
+    values.frombytes(body[: sizes[0] * sizes[1] * sizes[2] * values.itemsize])
+    numbers = lambda text: [float(n) for n in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", text)]
+    origin, steps = numbers(fields["space origin"]), numbers(fields["space directions"])
+    if "posterior" in fields["space"] and "left" in fields["space"]:
+        spacing = [steps[0], steps[4], steps[8]]
+    at = lambda mm: values[sum(round((mm[a] - origin[a]) / spacing[a]) * (1, sizes[0], sizes[0] * sizes[1])[a] for a in range(3))]
+    return values, at
+
+
+def world(state, view, px, py):
+    """LPS mm of a pixel of the window, as SliceView has it."""
+    v = state["views"][view]
+    x = (px - v["x"] + 0.5 - v["width"] / 2) * v["mm_per_pixel"]
+    y = (py - v["y"] + 0.5 - v["height"] / 2) * v["mm_per_pixel"]
+    c, cross = v["centre_mm"], state["cross_mm"]
+    return [(c[0] + x, c[1] + y, cross[2]), (c[0] + x, cross[1], c[2] - y), (cross[0], c[1] + x, c[2] - y)][view]
+
+
+shutil.rmtree(work, ignore_errors=True)
+work.mkdir(parents=True)
+os.chdir(work)
+os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
+os.environ["XDG_STATE_HOME"] = str(work / "state")
+osteo("phantom", "ct.nrrd", "--labels-out", "labels.nrrd", "--region", "temporal", "--spacing-mm", "1", "--quiet")
+osteo("prepare", "ct.nrrd", "-o", "case", "--lower", "400", "--spacing-mm", "1", "--structures", "labels.nrrd", "--names", "6=facial nerve", "--quiet")
+bone_before = pathlib.Path("case/bone.vdb").read_bytes()
+files_before = {p.name for p in work.iterdir()}
+
+with Screen("1024x700") as screen:
+    w = Window()
+    s = w.state()
+    assert s["size"] == [1024, 700] and s["steps"] == 0 and not s["unsaved"], s
+    assert abs(s["lower_hu"] - 400) < 3, s  # the threshold of the case
+
+    # Looking around.
+    s = w.key("Up", "next slice", lambda t: t["views"][0]["slice"] == s["views"][0]["slice"] + 1)
+    w.x("click", 4)
+    s = w.until("wheel", lambda t: t["views"][0]["slice"] == s["views"][0]["slice"] + 1)
+    x, y = w.place(1, 0.4, 0.6)
+    w.x("keydown", "shift", "mousemove", x, y)
+    want = world(s, 1, x, y)
+    s = w.until("the crosshair follows", lambda t: abs(t["cross_mm"][0] - want[0]) < 1 and abs(t["cross_mm"][2] - want[2]) < 1)
+    w.x("keyup", "shift")
+    w.key("F4", "preset", lambda t: t["window_hu"] == 4000 and t["level_hu"] == 700)
+    w.drag(w.place(0, 0.5, 0.5), w.place(0, 0.6, 0.5))
+    s = w.until("window by drag", lambda t: t["window_hu"] > 4050)
+    w.x("mousemove", *w.place(2, 0.5, 0.5), "click", "--repeat", 2, "--delay", 60, 1)
+    w.until("enlarged", lambda t: t["enlarged"] == 2 and t["views"][2]["width"] > 700)
+    w.x("click", "--repeat", 2, "--delay", 60, 1)
+    w.until("four again", lambda t: t["enlarged"] == -1)
+    w.key("F1", "help", lambda t: t["help"])
+    w.key("F1", "help away", lambda t: not t["help"])
+
+    # A threshold by the slider, live, then applied.
+    s = w.key("3", "threshold", lambda t: t["tool"] == "Threshold" and t["threshold_slider"][2] > 50)
+    left, top, width, height = s["threshold_slider"]
+    middle = round(top + height / 2)
+    w.drag((round(left + 0.30 * width), middle), (round(left + 0.35 * width), middle))
+    s = w.until("another threshold", lambda t: 450 < t["lower_hu"] < 700 and t["steps"] == 0)
+    lower = s["lower_hu"]
+    s = w.key("Return", "applied", lambda t: t["steps"] == 1 and not t["busy"])
+    assert "removed" in s["message"] and s["unsaved"], s
+
+    # Two strokes in air beside the head; the second is taken back.
+    w.x("mousemove", *w.place(0, 0.5, 0.5))
+    s = w.key("9", "brush", lambda t: t["tool"] == "Brush")
+    kept = [world(s, 0, *w.place(0, a, 0.5)) for a in (0.30, 0.36)]
+    w.drag(w.place(0, 0.30, 0.5), w.place(0, 0.36, 0.5))
+    w.until("a stroke", lambda t: t["steps"] == 2)
+    undone = world(s, 0, *w.place(0, 0.5, 0.25))
+    w.drag(w.place(0, 0.5, 0.25), w.place(0, 0.5, 0.27))
+    w.until("another stroke", lambda t: t["steps"] == 3)
+    w.key("ctrl+z", "undo", lambda t: t["steps"] == 2 and t["can_redo"])
+
+    # It asks before it closes, and goes on.
+    w.key("q", "asks", lambda t: t["asking"])
+    w.key("Escape", "goes on", lambda t: not t["asking"])
+    w.key("ctrl+s", "saved", lambda t: not t["unsaved"] and not t["saving"] and t["message"].startswith("saved"))
+    w.x("key", "q")
+    w.end()
+
+    # By effect: the corrections on the mask that prepare makes give these voxels.
+    osteo("threshold", "ct.nrrd", "mask.nrrd", "--lower", 400, "--quiet")
+    osteo("apply-edits", "ct.nrrd", "mask.nrrd", "case/edits.json", "corrected.nrrd", "--quiet")
+    ct, hu = nrrd("ct.nrrd")
+    mask, bone = nrrd("corrected.nrrd")
+    ball = sum(1 for h, b in zip(ct, mask) if b and h < lower)
+    assert all(b for h, b in zip(ct, mask) if h >= lower), "a voxel above the threshold is missing"
+    assert 20 < ball < 400, ball  # the stroke alone
+    assert all(bone(p) for p in kept) and all(hu(p) < lower for p in kept), (kept, [hu(p) for p in kept])
+    assert hu(undone) >= lower or not bone(undone), undone
+    assert pathlib.Path("case/bone.vdb").read_bytes() != bone_before
+    osteo("scene", "case")
+
+    # prepare keeps them; a threshold that would have no say is refused; they can be taken to a copy, and dropped.
+    saved = {p.name: p.read_bytes() for p in pathlib.Path("case").iterdir() if p.suffix in (".vdb", ".ply", ".nrrd", ".json") and "prov" not in p.name and p.name != "manifest.json"}
+    assert "--edits" in osteo("prepare", "-o", "case")
+    assert "has no say" in osteo("prepare", "-o", "case", "--lower", 300, code=2)
+    assert all((pathlib.Path("case") / n).read_bytes() == b for n, b in saved.items())
+    osteo("prepare", "ct.nrrd", "-o", "copy", "--lower", "400", "--spacing-mm", "1", "--structures", "labels.nrrd", "--names", "6=facial nerve", "--quiet")
+    assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before
+    osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
+    assert all((pathlib.Path("copy") / n).read_bytes() == b for n, b in saved.items()), "the copy differs"
+    osteo("prepare", "-o", "copy", "--no-edits", "--quiet")
+    assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before and not pathlib.Path("copy/edits.json").exists()
+    osteo("phantom", "other.nrrd", "--region", "temporal", "--spacing-mm", "1", "--individual", 3, "--quiet")
+    osteo("prepare", "other.nrrd", "-o", "other", "--lower", "400", "--spacing-mm", "1", "--quiet")
+    assert "another CT" in osteo("edit", "other", "--apply", "case/edits.json", code=2)
+
+    # Opened again it is as it was left, and can be undone from there. Closed without saving the case stays.
+    w = Window()
+    s = w.state()
+    assert s["steps"] == 2 and not s["unsaved"] and s["structures"][0]["name"] == "facial nerve", s
+    w.x("mousemove", *w.place(0, 0.5, 0.5))
+    w.key("ctrl+z", "undo", lambda t: t["steps"] == 1 and t["unsaved"])
+    w.key("q", "asks", lambda t: t["asking"])
+    w.x("key", "d")
+    w.end()
+    assert all((pathlib.Path("case") / n).read_bytes() == b for n, b in saved.items())
+
+    # No disk for it: told, and the case is as it was.
+    w = Window("--width", 1000, "--height", 680)
+    w.key("ctrl+z", "undo", lambda t: t["unsaved"])
+    pathlib.Path("ct.nrrd").rename("moved.nrrd")
+    w.key("ctrl+s", "not saved", lambda t: t["message"].startswith("NOT SAVED") and not t["saving"] and t["unsaved"])
+    pathlib.Path("moved.nrrd").rename("ct.nrrd")
+    w.key("ctrl+s", "saved", lambda t: t["message"].startswith("saved") and not t["unsaved"])
+    w.x("key", "q")
+    w.end()
+
+# Nothing of the scan lies about.
+made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd"}
+assert all(n.startswith("state") or n.endswith(".prov.json") for n in made), made
+print("window edit: all as it should be")
