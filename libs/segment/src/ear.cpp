@@ -214,7 +214,7 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
          &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
     sinus.why = tegmen.why = dura.why = brain.why;
     if (brain.found) {
-      sinus = find_sinus(f, levels, canal, brain, context.sub(0.6, 0.9));
+      sinus = find_sinus(f, levels, canal, context.sub(0.6, 0.9));
       if (air.found) {
         tegmen = find_tegmen(f, levels, canal, brain, air.mask, context);
       } else {

@@ -1,6 +1,8 @@
 // The external canal and the air behind the drum.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <queue>
 
 #include "ear_parts.h"
 #include "osteo/base/parallel.h"
@@ -9,7 +11,82 @@ namespace osteo::segment {
 namespace {
 
 constexpr double kOutsideBallMm = 8;  // wider than the canal, narrower than what is outside
+constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
 constexpr double kCavityMm3 = 150;    // the middle ear has more; behind wax or a bend there is less
+
+/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they widen it opens into a
+/// fold of the skin; from there on only what lies straight on is kept.
+void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside) {
+  const std::size_t n = f.size();
+  float deepest = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (mask[i] != 0) deepest = std::max(deepest, to_outside[i]);
+  constexpr float kFar = std::numeric_limits<float>::max();
+  std::vector<float> way(n, kFar);
+  using Entry = std::pair<float, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (mask[i] == 0 || to_outside[i] < deepest - 1.5F) continue;
+    way[i] = 0;
+    queue.emplace(0.0F, i);
+  }
+  while (!queue.empty()) {
+    const auto [w, at] = queue.top();
+    queue.pop();
+    if (w > way[at]) continue;
+    const auto p = f.place(at);
+    for (int k = -1; k <= 1; ++k)
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) {
+          if (!f.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
+          const std::size_t to = f.at(p[0] + i, p[1] + j, p[2] + k);
+          const auto step = static_cast<float>(f.h_mm * std::sqrt(static_cast<double>(i * i + j * j + k * k)));
+          if (mask[to] == 0 || w + step >= way[to]) continue;
+          way[to] = w + step;
+          queue.emplace(way[to], to);
+        }
+  }
+  struct Shell {
+    Vec3 sum;
+    double count = 0;
+  };
+  std::vector<Shell> shells;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (way[i] == kFar) continue;
+    const auto s = static_cast<std::size_t>(way[i]);
+    if (shells.size() <= s) shells.resize(s + 1);
+    const auto p = f.place(i);
+    shells[s].sum += f.world(p[0], p[1], p[2]);
+    shells[s].count += 1;
+  }
+  if (shells.size() < 10) return;
+  std::vector<double> areas;
+  for (std::size_t s = 3; s < std::min<std::size_t>(13, shells.size()); ++s) areas.push_back(shells[s].count);
+  std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
+  const double usual = areas[areas.size() / 2], radius = std::sqrt(usual * f.h_mm * f.h_mm * f.h_mm / 3.14159265358979);
+  std::size_t mouth = shells.size();
+  for (std::size_t s = 8; s + 1 < shells.size() && mouth == shells.size(); ++s)
+    if (shells[s].count > 1.5 * usual && shells[s + 1].count > 1.5 * usual) mouth = s;
+  const auto middle = [&](std::size_t s) { return shells[s].sum / std::max(1.0, shells[s].count); };
+  const std::size_t last = mouth - 1;
+  const Vec3 tip = middle(last), out = normalized(tip - middle(last > 6 ? last - 6 : 0));
+  for (std::size_t i = 0; i < n; ++i) {
+    if (mask[i] == 0) continue;
+    if (way[i] == kFar) {
+      mask[i] = 0;
+      continue;
+    }
+    const auto s = static_cast<std::size_t>(way[i]);
+    const auto p = f.place(i);
+    const Vec3 x = f.world(p[0], p[1], p[2]);
+    if (s < mouth) {
+      if (length(x - middle(s)) > 2.5 * radius + 1) mask[i] = 0;
+      continue;
+    }
+    const double on = dot(x - tip, out);
+    if (on < -1 || on > 14 || length(x - tip - out * on) > 1.3 * radius + 0.5) mask[i] = 0;
+  }
+}
 
 }  // namespace
 
@@ -74,18 +151,61 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
   const std::vector<float> up = climbed(f, height, seeds, [&](std::size_t i) { return pieces.of[i] == best; });
   const Pass pass = greatest_pass(f, height, up, std::max(25.0, 1.0 * levels.noise_hu));
   const bool drum = pass.volume_mm3 > kCavityMm3;
+  // Voxels at the walls are as high as a pass: they go with the nearest that are not.
+  Mask before(n), behind(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (pieces.of[i] != best) continue;
+    before[i] = !drum || static_cast<double>(up[i]) < pass.height ? 1 : 0;
+    behind[i] = drum && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
+  }
+  const std::vector<float> to_before = distance_mm(f, before, context), to_behind = distance_mm(f, behind, context);
+  // The folds of the auricle are open to more sides than a canal is.
+  Mask inner(n);
+  parallel_for(n, 1 << 12, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (pieces.of[i] != best || static_cast<double>(to_before[i]) > static_cast<double>(to_behind[i])) continue;
+      const auto p = f.place(i);
+      inner[i] = static_cast<double>(to_outside[i]) > 25 ||
+                         enclosure(f, f.world(p[0], p[1], p[2]), 14, [&](std::size_t q) { return air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
+                     ? 1
+                     : 0;
+    }
+  });
+  const Pieces inners = pieces_of(f, inner, true);
+  std::vector<double> depth(inners.size.size());
+  for (std::size_t i = 0; i < n; ++i)
+    if (inners.of[i] != 0 && static_cast<double>(to_outside[i]) > 6) depth[inners.of[i]] += 1;
+  const std::size_t main = static_cast<std::size_t>(std::max_element(depth.begin(), depth.end()) - depth.begin());
+  for (std::size_t i = 0; i < n; ++i) inner[i] = main > 0 && inners.of[i] == main ? 1 : 0;
+  const std::vector<float> to_inner = distance_mm(f, inner, context);
   c.mask.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    if (pieces.of[i] == best && (!drum || static_cast<double>(up[i]) < pass.height)) c.mask[i] = 1;
+    c.mask[i] = pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
+  }
+  keep_tube(f, c.mask, to_outside);
+  // Against bone the edge lies half way from air to bone, which is higher than half way to skin.
+  {
+    const std::vector<float> to_mask = distance_mm(f, c.mask, context);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (c.mask[i] != 0 || c.exterior[i] != 0 || to_behind[i] < to_before[i]) continue;
+      c.mask[i] = static_cast<double>(to_mask[i]) < 1.1 * f.h_mm && static_cast<double>(to_bone[i]) < 1.6 * f.h_mm &&
+                          static_cast<double>(f.v[i]) < levels.cell_below
+                      ? 1
+                      : 0;
+    }
   }
   // Its inner end: the voxels deepest from the outside.
   double deepest = 0;
   for (std::size_t i = 0; i < n; ++i)
     if (c.mask[i] != 0) deepest = std::max(deepest, static_cast<double>(to_outside[i]));
+  if (deepest <= 0) {
+    c.why = "no air goes from outside into bone on this side";
+    return c;
+  }
   Vec3 sum;
   double count = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    if (c.mask[i] == 0 || static_cast<double>(to_outside[i]) < deepest - 2) continue;
+    if (c.mask[i] == 0 || static_cast<double>(to_outside[i]) < deepest - 1) continue;
     const auto p = f.place(i);
     sum += f.world(p[0], p[1], p[2]);
     count += 1;
@@ -169,8 +289,7 @@ Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, co
       continue;
     }
     const auto v = static_cast<double>(f.v[i]);
-    const bool by_bone = static_cast<double>(to_bone[i]) < 1.6 * f.h_mm;
-    const double level = by_bone ? levels.cell_below : levels.air_below;
+    const double level = levels.cell_below;
     part.mask[i] = v < level ? 1 : 0;
     volume += v < level ? voxel : 0;
     more += v < level + kShiftHu ? voxel : 0;

@@ -34,6 +34,31 @@ Pieces pieces_of(const Field& f, const Mask& mask, bool full) {
   return p;
 }
 
+double enclosure(const Field& f, Vec3 from, double reach_mm, const std::function<int(std::size_t)>& what) {
+  static const std::vector<Vec3> directions = [] {
+    std::vector<Vec3> d;
+    constexpr int kCount = 96;
+    for (int i = 0; i < kCount; ++i) {  // a spiral of equal areas
+      const double z = 1 - 2 * (i + 0.5) / kCount, r = std::sqrt(1 - z * z), a = i * 2.399963229728653;
+      d.push_back({r * std::cos(a), r * std::sin(a), z});
+    }
+    return d;
+  }();
+  int met = 0;
+  for (const Vec3& d : directions) {
+    for (double l = 1.5; l < reach_mm; l += 0.7) {
+      const Vec3 x = (from + d * l - f.origin_mm) / f.h_mm;
+      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)), k = static_cast<int>(std::lround(x.z));
+      if (!f.inside(i, j, k)) break;
+      const int w = what(f.at(i, j, k));
+      if (w == 0) continue;
+      met += w > 0 ? 1 : 0;
+      break;
+    }
+  }
+  return static_cast<double>(met) / static_cast<double>(directions.size());
+}
+
 std::vector<float> climbed(const Field& f, const std::vector<float>& height, const std::vector<std::size_t>& seeds,
                            const std::function<bool(std::size_t)>& open) {
   constexpr float kNever = std::numeric_limits<float>::infinity();

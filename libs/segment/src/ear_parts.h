@@ -51,6 +51,9 @@ struct Pieces {
 };
 [[nodiscard]] Pieces pieces_of(const Field& f, const Mask& mask, bool full_connectivity);
 
+/// The share of 96 directions in space that meet a wall within `reach_mm`. `what`: 1 wall, 0 goes on, -1 open.
+[[nodiscard]] double enclosure(const Field& f, Vec3 from_mm, double reach_mm, const std::function<int(std::size_t)>& what);
+
 /// From the seeds through what `open` lets in: the least height that must be climbed to each voxel (infinity: not reached).
 [[nodiscard]] std::vector<float> climbed(const Field& f, const std::vector<float>& height, const std::vector<std::size_t>& seeds,
                                          const std::function<bool(std::size_t)>& open);
@@ -69,7 +72,7 @@ struct Pass {
                                const Context& context);
 [[nodiscard]] Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Mask& sinus,
                              const Context& context);
-[[nodiscard]] Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Brain& brain, const Context& context);
+[[nodiscard]] Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Context& context);
 [[nodiscard]] Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const Context& context);
 
 }  // namespace osteo::segment

@@ -20,32 +20,7 @@ constexpr double kLeastRadiusMm = 2.5, kMostRadiusMm = 7.5;
 constexpr double kStepMm = 0.5;
 constexpr int kRays = 48;
 constexpr double kHeld = 0.5;  // share of the round
-
-/// The share of 96 directions that meet what is no soft tissue within 12 mm.
-double enclosure(const Field& f, const Mask& wall, Vec3 from) {
-  static const std::vector<Vec3> directions = [] {
-    std::vector<Vec3> d;
-    constexpr int kCount = 96;
-    for (int i = 0; i < kCount; ++i) {  // a spiral of equal areas
-      const double z = 1 - 2 * (i + 0.5) / kCount, r = std::sqrt(1 - z * z), a = i * 2.399963229728653;
-      d.push_back({r * std::cos(a), r * std::sin(a), z});
-    }
-    return d;
-  }();
-  int met = 0;
-  for (const Vec3& d : directions) {
-    for (double l = 1.5; l < 12; l += 0.7) {
-      const Vec3 x = (from + d * l - f.origin_mm) / f.h_mm;
-      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)), k = static_cast<int>(std::lround(x.z));
-      if (!f.inside(i, j, k)) break;
-      if (wall[f.at(i, j, k)] != 0) {
-        ++met;
-        break;
-      }
-    }
-  }
-  return static_cast<double>(met) / static_cast<double>(directions.size());
-}
+constexpr double kBridged = 0.3, kBridgeMm = 6;
 
 struct Round {
   Vec3 centre;
@@ -138,7 +113,7 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
 
 }  // namespace
 
-Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Brain&, const Context& context) {
+Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
   Part part;
   const std::size_t n = f.size();
   Mask wall(n);
@@ -146,6 +121,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     const auto v = static_cast<double>(f.v[i]);
     wall[i] = v > levels.bone_above || v < levels.air_below ? 1 : 0;
   }
+  // Skin over bone is no groove.
+  const auto holds = [&](std::size_t i) { return wall[i] == 0 ? 0 : canal.exterior[i] != 0 ? -1 : 1; };
   const std::vector<float> to_wall = distance_mm(f, wall, context);
   // How enclosed each place of a coarser grid is that is as far from walls as the middle of a sinus.
   Field g;
@@ -170,7 +147,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
       const auto q = f.nearest(x);
       wide[i] = to_wall[f.at(q[0], q[1], q[2])];
       const auto w = static_cast<double>(wide[i]);
-      if (w > 2.3 && w < 8) g.v[i] = static_cast<float>(enclosure(f, wall, x));
+      if (w > 2.3 && w < 8) g.v[i] = static_cast<float>(enclosure(f, x, 12, holds));
     }
   });
   // The groove: where walls are all around, behind the canal.
@@ -322,9 +299,18 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, line.size() - 1); ++q) sum += rounds[q].held, ++count;
     return sum / count >= kHeld;
   };
-  std::size_t first = centre, last = centre;
-  while (first > 0 && held(first - 1)) --first;
-  while (last + 1 < line.size() && held(last + 1)) ++last;
+  // Short stretches that less bone holds, as before the jugular bulb, do not end it.
+  const auto end_of = [&](int step) {
+    std::size_t end = centre;
+    for (auto i = static_cast<std::ptrdiff_t>(centre); i >= 0 && i < static_cast<std::ptrdiff_t>(line.size()); i += step) {
+      const auto at = static_cast<std::size_t>(i);
+      if (rounds[at].held < kBridged && !held(at)) break;
+      if (held(at)) end = at;
+      if (std::abs(static_cast<double>(i) - static_cast<double>(end)) * kStepMm > kBridgeMm) break;
+    }
+    return end;
+  };
+  const std::size_t first = end_of(-1), last = end_of(1);
   // Beyond the ends, straight on.
   std::vector<Round> tube(rounds.begin() + static_cast<std::ptrdiff_t>(first), rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
   for (std::size_t i = 0; i < tube.size(); ++i) tube[i].centre = line[first + i], tube[i].radius = radius[first + i];

@@ -169,6 +169,12 @@ Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const B
     inner[i] = brain.mask[i] != 0 || (soft[i] != 0 && sinus[i] == 0 && static_cast<double>(to_core[i]) < kBallMm && static_cast<double>(to_brain[i]) < 4) ? 1 : 0;
     bone[i] = static_cast<double>(f.v[i]) >= levels.bone_above ? 1 : 0;
   }
+  // What is only near, as the blurred edge of a cell across a thin plate, is no part of it.
+  const Pieces pieces = pieces_of(f, inner, false);
+  std::vector<std::uint8_t> joined(pieces.size.size());
+  for (std::size_t i = 0; i < n; ++i)
+    if (brain.mask[i] != 0) joined[pieces.of[i]] = 1;
+  for (std::size_t i = 0; i < n; ++i) inner[i] = inner[i] != 0 && joined[pieces.of[i]] != 0 ? 1 : 0;
   const std::vector<float> to_bone = distance_mm(f, bone, context);
   const Vec3 lo = canal.drum_mm + Vec3{-22, -25, -30}, hi = canal.drum_mm + Vec3{32, 45, 25};
   part.mask.assign(n, 0);

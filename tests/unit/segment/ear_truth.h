@@ -25,6 +25,7 @@ inline Image scaled(const Image& ct, double factor) {
 inline std::vector<bool> held_part(const HeadAnatomy& head) {
   const auto line = head.sigmoid_sinus();
   std::vector<bool> held(line.size());
+  std::vector<double> share(line.size());
   for (std::size_t i = 1; i + 1 < line.size(); ++i) {
     const Vec3 along = normalized(line[i + 1].at_mm - line[i - 1].at_mm), u = any_perpendicular(along), v = cross(along, u);
     int n = 0;
@@ -37,15 +38,24 @@ inline std::vector<bool> held_part(const HeadAnatomy& head) {
         break;
       }
     }
-    held[i] = n >= 32;
+    share[i] = n / 64.0;
   }
   // From the point beside the drum both ways.
   std::size_t middle = 0;
   for (std::size_t i = 0; i < line.size(); ++i)
     if (std::abs(line[i].at_mm.z + 22) < std::abs(line[middle].at_mm.z + 22) && line[i].at_mm.y > 20) middle = i;
-  std::size_t first = middle, last = middle;
-  while (first > 0 && held[first - 1]) --first;
-  while (last + 1 < line.size() && held[last + 1]) ++last;
+  const auto end_of = [&](int step) {
+    std::size_t end = middle;
+    double since = 0;
+    for (auto i = static_cast<std::ptrdiff_t>(middle); i > 0 && i + 1 < static_cast<std::ptrdiff_t>(line.size()); i += step) {
+      const auto at = static_cast<std::size_t>(i);
+      since += length(line[at].at_mm - line[static_cast<std::size_t>(i - step)].at_mm);
+      if (share[at] >= 0.5) end = at, since = 0;
+      if (share[at] < 0.3 || since > 6) break;  // short stretches that less bone holds do not end it
+    }
+    return end;
+  };
+  const std::size_t first = end_of(-1), last = end_of(1);
   for (std::size_t i = 0; i < line.size(); ++i) held[i] = i >= first && i <= last;
   return held;
 }
@@ -130,8 +140,31 @@ inline std::vector<std::uint8_t> ear_truth(const Labels& labels, const HeadAnato
       std::vector<std::uint8_t> foot(plates.size());
       for (std::size_t c = 0; c < plates.size(); ++c) foot[c] = plates[c].air ? 1 : 0;
       foot = near(near(foot, 1, 2), 0, 2);
+      // The largest piece: others lie under the posterior fossa.
+      std::vector<int> piece(plates.size(), 0);
+      int pieces = 0, best = 0;
+      std::size_t most = 0;
       for (std::size_t c = 0; c < plates.size(); ++c) {
-        if (foot[c] == 0 || plates[c].top < -1e8) continue;
+        if (foot[c] == 0 || piece[c] != 0) continue;
+        std::vector<std::size_t> stack{c};
+        piece[c] = ++pieces;
+        std::size_t size = 0;
+        while (!stack.empty()) {
+          const std::size_t at = stack.back();
+          stack.pop_back();
+          ++size;
+          const int x = static_cast<int>(at) % nx, y = static_cast<int>(at) / nx;
+          for (int dy = -1; dy <= 1; ++dy)
+            for (int dx = -1; dx <= 1; ++dx) {
+              if (x + dx < 0 || y + dy < 0 || x + dx >= nx || y + dy >= ny) continue;
+              const auto to = static_cast<std::size_t>((y + dy) * nx + x + dx);
+              if (foot[to] != 0 && piece[to] == 0) piece[to] = pieces, stack.push_back(to);
+            }
+        }
+        if (size > most) most = size, best = pieces;
+      }
+      for (std::size_t c = 0; c < plates.size(); ++c) {
+        if (piece[c] != best || plates[c].top < -1e8) continue;
         const double low = std::max(plates[c].bottom, plates[c].top - 4);
         for (int k = 0; k < nz; ++k) {
           const double z = f.origin_mm.z + k * f.spacing_mm.z;
