@@ -181,6 +181,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     const double value = static_cast<double>(g.v[i]) + 0.05 * static_cast<double>(wide[i]);
     if (value > start_value) start_value = value, start = i;
   }
+  // Below the lowest place of the groove the vein leaves the skull, and muscles between bones look like grooves too.
+  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 3;
   constexpr float kFar = std::numeric_limits<float>::max();
   std::vector<float> reached(g.size(), kFar);
   std::vector<float> way_mm(g.size(), 0.0F);
@@ -203,7 +205,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
         for (int i = -1; i <= 1; ++i) {
           if ((i == 0 && j == 0 && k == 0) || !g.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
-          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm) continue;
+          if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest) continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
           const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.05 + worth(to)));
           if (cost < reached[to]) {
@@ -231,6 +233,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (reached[i] == kFar) continue;
     const auto p = g.place(i);
     const Vec3 x = g.world(p[0], p[1], p[2]);
+    if (x.z < lowest || worth(i) < 0.35) continue;
     // Upwards it goes backwards too; downwards inward and forward.
     if (x.z > middle.z + 2 && x.y > middle.y - 3 && way_mm[i] > way_mm[up]) up = i;
     if (x.z < middle.z + 4 && x.x < middle.x && x.y < middle.y + 4 && way_mm[i] > way_mm[down]) down = i;
@@ -311,20 +314,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     return end;
   };
   const std::size_t first = end_of(-1), last = end_of(1);
-  // Beyond the ends, straight on.
   std::vector<Round> tube(rounds.begin() + static_cast<std::ptrdiff_t>(first), rounds.begin() + static_cast<std::ptrdiff_t>(last) + 1);
   for (std::size_t i = 0; i < tube.size(); ++i) tube[i].centre = line[first + i], tube[i].radius = radius[first + i];
-  for (const bool end : {false, true}) {
-    for (int step = 0; step < 12 && tube.size() > 8; ++step) {
-      const Round tip = end ? tube.back() : tube.front();
-      const Vec3 back = end ? tube[tube.size() - 7].centre : tube[6].centre;
-      const Vec3 along = normalized(tip.centre - back);
-      Round next = fit_round(f, levels, tip.centre + along, along, tip.radius);
-      if (next.held < kHeld || length(next.centre - tip.centre) > 1.8) break;
-      next.centre = (next.centre + tip.centre + along) * 0.5;
-      tube.insert(end ? tube.end() : tube.begin(), next);
-    }
-  }
   double long_mm = 0, hold = 0, rough = 0;
   for (std::size_t i = 0; i < tube.size(); ++i) {
     if (i > 0) long_mm += length(tube[i].centre - tube[i - 1].centre);
