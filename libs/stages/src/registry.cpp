@@ -7,6 +7,7 @@
 #include "osteo/stages/image.h"
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
+#include "osteo/stages/segment.h"
 #include "osteo/stages/snapshot.h"
 #include "osteo/stages/tissue.h"
 
@@ -37,6 +38,8 @@ Registry osteo_stages() {
   registry.add<CurveStage>();
   registry.add<SnapshotStage>();
   registry.add<StructuresStage>();
+  registry.add<TubeStage>();
+  registry.add<FindStructuresStage>();
   registry.add<PhantomStage>();
   return registry;
 }

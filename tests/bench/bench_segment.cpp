@@ -1,0 +1,206 @@
+// Tubes and structures of the ear against their truth: the tables of docs/structures.md. Not a test.
+//   osteo_bench_segment tubes
+//   osteo_bench_segment nerves|ears [FIRST LAST SPACING SLICE NOISE SCALE]
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "osteo/base/error.h"
+#include "osteo/image/phantom.h"
+#include "osteo/segment/ear.h"
+#include "osteo/segment/tube.h"
+#include "segment/ear_truth.h"
+#include "segment/tube_ct.h"
+
+using namespace osteo;
+using namespace osteo::test;
+
+namespace {
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+double cpu() {
+  rusage u{};
+  getrusage(RUSAGE_SELF, &u);
+  return static_cast<double>(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * static_cast<double>(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
+}
+
+void tubes() {
+  std::printf("| tube | diameter mm | CT | mean mm | worst mm | radius mean mm | confidence | CPU s |\n|---|---|---|---|---|---|---|---|\n");
+  const char* const names[] = {"straight", "helix", "genu"};
+  for (int shape = 0; shape < 3; ++shape) {
+    for (const double d : {0.6, 1.0, 1.5, 2.0, 3.0}) {
+      const Line line = shape == 0 ? straight_line(d / 2) : shape == 1 ? helix(d / 2) : genu(d / 2);
+      for (int kind = 0; kind < 6; ++kind) {
+        TubeCt s;
+        if (kind == 1) s.cellular = true;
+        if (kind == 2) s.spacing_mm = {0.5, 0.5, 1};
+        if (kind == 3) s.oblique = true;
+        if (kind == 4) s.spacing_mm = {0.3, 0.3, 0.3};
+        if (kind == 5) s.cellular = true, s.spacing_mm = {0.5, 0.5, 1}, s.oblique = true;
+        const char* const ct_names[] = {"cortical", "cellular", "0.5x0.5x1", "oblique", "0.3", "cellular, 0.5x0.5x1, oblique"};
+        const Image ct = make_tube_ct(line, s);
+        const std::size_t n = line.points.size();
+        std::vector<Vec3> points{line.points[3], line.points[n - 4]};
+        if (shape == 1) points = {line.points[3], line.points[n / 3], line.points[2 * n / 3], line.points[n - 4]};
+        const double c = cpu();
+        try {
+          const Tube t = trace_tube(ct, points, {});
+          Line part{{line.points.begin() + 3, line.points.end() - 3}, line.radius_mm};
+          const LineError e = line_error(t, part);
+          std::printf("| %s | %.1f | %s | %.3f | %.2f | %.2f | %.2f | %.1f |\n", names[shape], d, ct_names[kind], e.mean_mm, e.worst_mm,
+                      t.radius_mean_mm, t.confidence, cpu() - c);
+        } catch (const Error& e) {
+          std::printf("| %s | %.1f | %s | %s |\n", names[shape], d, ct_names[kind], e.what());
+        }
+        std::fflush(stdout);
+      }
+    }
+  }
+}
+
+Line part_of(std::span<const TubePoint> t, double from, double to) {
+  Line l;
+  double arc = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    if (i > 0) arc += length(t[i].at_mm - t[i - 1].at_mm);
+    if (arc >= from && arc <= to) l.points.push_back(t[i].at_mm), l.radius_mm += t[i].radius_mm;
+  }
+  l.radius_mm = (l.radius_mm - 1) / static_cast<double>(l.points.size());
+  return l;
+}
+
+void nerves(int first, int last, double spacing, double slice, double noise) {
+  std::printf("| individual | nerve | mm | mean mm | worst mm | radius mm | true | confidence | unsure | CPU s |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  for (int who = first; who <= last; ++who) {
+    const HeadAnatomy head(static_cast<std::uint64_t>(who));
+    for (const PhantomRegion region : {PhantomRegion::temporal, PhantomRegion::mandible}) {
+      if (region == PhantomRegion::mandible && getenv("NOJAW")) continue;
+      PhantomParams p;
+      p.region = region;
+      p.spacing_mm = spacing;
+      p.slice_mm = slice;
+      p.noise_hu = noise;
+      p.individual = who;
+      const Image ct = make_phantom(p).ct;
+      struct Task {
+        const char* name;
+        Line line;
+        std::vector<double> clicks;  // shares of the way
+        double max_radius_mm = 2.5;
+      };
+      std::vector<Task> tasks;
+      if (region == PhantomRegion::temporal) {
+        const auto m = head.facial_nerve_marks();
+        tasks.push_back({"facial", part_of(head.facial_nerve(), m.fundus_mm, m.foramen_mm), {0, 0.13, 0.5, 1}});
+        tasks.push_back({"facial, from the genu", part_of(head.facial_nerve(), m.geniculate_mm, m.foramen_mm), {0, 0.42, 1}});
+        tasks.push_back({"facial, mastoid part", part_of(head.facial_nerve(), m.second_genu_mm, m.foramen_mm), {0, 1}});
+        tasks.push_back({"chorda, in bone", part_of(head.chorda_tympani(), 1, 6.5), {0, 0.5, 1}, 0.6});
+        tasks.push_back({"chorda", part_of(head.chorda_tympani(), 1, 20), {0, 0.14, 0.28, 0.42, 0.58, 0.72, 0.86, 1}, 0.6});
+      } else {
+        tasks.push_back({"alveolar", part_of(head.alveolar_nerve(), 2, 1000), {0, 0.5, 1}});
+      }
+      for (const Task& t : tasks) {
+        std::vector<Vec3> clicks;
+        for (const double c : t.clicks) clicks.push_back(t.line.points[static_cast<std::size_t>(c * static_cast<double>(t.line.points.size() - 1))]);
+        const double c0 = cpu();
+        try {
+          TubeParams tp;
+          tp.max_radius_mm = t.max_radius_mm;
+          const Tube tube = trace_tube(ct, clicks, tp);
+          const LineError e = line_error(tube, t.line);
+          std::string unsure;
+          for (const auto& u : tube.unsure_mm) {
+            char text[40];
+            std::snprintf(text, sizeof text, "%.1f-%.1f ", u[0], u[1]);
+            unsure += text;
+          }
+          std::printf("| %d | %s | %.1f | %.3f | %.2f | %.2f | %.2f | %.2f | %s | %.1f |\n", who, t.name, tube.length_mm, e.mean_mm, e.worst_mm,
+                      tube.radius_mean_mm, t.line.radius_mm, tube.confidence, unsure.c_str(), cpu() - c0);
+        } catch (const Error& e) {
+          std::printf("| %d | %s | %s |\n", who, t.name, e.what());
+        }
+        std::fflush(stdout);
+      }
+    }
+  }
+}
+
+void ears(int first, int last, double spacing, double slice, double noise, double scale) {
+  std::printf("| individual | structure | Dice | surface distance, mean mm | 95 %% mm | quality | mm3 | true mm3 |\n|---|---|---|---|---|---|---|---|\n");
+  struct Sum {
+    double dice = 0, worst = 1, mean = 0, p95 = 0, worst95 = 0;
+    int n = 0, missing = 0;
+  };
+  std::array<Sum, kEarStructures> sums;
+  double seconds = 0;
+  for (int who = first; who <= last; ++who) {
+    PhantomParams p;
+    p.region = PhantomRegion::temporal;
+    p.spacing_mm = spacing;
+    p.slice_mm = slice;
+    p.noise_hu = noise;
+    p.individual = who;
+    Phantom phantom = make_phantom(p);
+    if (scale != 1) phantom.ct = scaled(phantom.ct, scale);
+    const HeadAnatomy head(static_cast<std::uint64_t>(who));
+    EarParams e;
+    e.what = "all";
+    e.labyrinth_mm = {36.8, 3.1, -16.4};
+    const double c = cpu();
+    const EarFindings found = find_ear_structures(phantom.ct, e);
+    seconds += cpu() - c;
+    for (const EarFinding& f : found.findings) {
+      Sum& sum = sums[static_cast<std::size_t>(f.what)];
+      const char* const name = EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)].data();
+      if (!f.found) {
+        std::printf("| %d | %s | not found: %s (%.2f) |\n", who, name, f.why.c_str(), f.quality);
+        ++sum.missing;
+        continue;
+      }
+      const std::vector<std::uint8_t> truth = ear_truth(phantom.labels, head, f.what);
+      const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + static_cast<int>(f.what)), truth);
+      std::printf("| %d | %s | %.3f | %.2f | %.2f | %.2f | %.0f | %.0f | %s\n", who, name, o.dice, o.mean_mm, o.p95_mm, f.quality, f.volume_mm3, o.true_mm3, f.why.c_str());
+      std::fflush(stdout);
+      sum.dice += o.dice, sum.mean += o.mean_mm, sum.p95 += o.p95_mm, ++sum.n;
+      sum.worst = std::min(sum.worst, o.dice);
+      sum.worst95 = std::max(sum.worst95, o.p95_mm);
+    }
+  }
+  std::printf("\n| structure | Dice mean | least | surface distance mean mm | 95 %%, mean mm | 95 %%, worst mm | not found |\n|---|---|---|---|---|---|---|\n");
+  for (int s = 0; s < kEarStructures; ++s) {
+    const Sum& m = sums[static_cast<std::size_t>(s)];
+    if (m.n + m.missing == 0) continue;
+    const double n = std::max(1, m.n);
+    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.2f | %d |\n", EnumNames<EarStructure>::values[static_cast<std::size_t>(s)].data(), m.dice / n,
+                m.worst, m.mean / n, m.p95 / n, m.worst95, m.missing);
+  }
+  std::printf("CPU %.1f s an ear\n", seconds / (last - first + 1));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string what = argc > 1 ? argv[1] : "";
+  const auto arg = [&](int i, double other) { return argc > i ? std::atof(argv[i]) : other; };
+  const double t = now();
+  if (what == "tubes") {
+    tubes();
+  } else if (what == "nerves") {
+    nerves(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30));
+  } else if (what == "ears") {
+    ears(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30), arg(7, 1));
+  } else {
+    std::fprintf(stderr, "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING SLICE NOISE]\n");
+    return 2;
+  }
+  rusage u{};
+  getrusage(RUSAGE_SELF, &u);
+  std::printf("%.0f s, %.0f MB\n", now() - t, static_cast<double>(u.ru_maxrss) / 1024);
+  return 0;
+}
