@@ -6,6 +6,7 @@
 #include "osteo/stages/image.h"
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
+#include "osteo/stages/register.h"
 #include "osteo/stages/snapshot.h"
 #include "osteo/stages/tissue.h"
 
@@ -35,6 +36,7 @@ Registry osteo_stages() {
   registry.add<CurveStage>();
   registry.add<SnapshotStage>();
   registry.add<StructuresStage>();
+  registry.add<RegisterStage>();
   registry.add<PhantomStage>();
   return registry;
 }
