@@ -9,6 +9,7 @@ _osteo() {
     "crop --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "threshold --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
+    "resample --between") COMPREPLY=($(compgen -W "automatic values outlines " -- "$cur")); return ;;
     "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
     "distance --region") COMPREPLY=($(compgen -W "box interior band " -- "$cur")); return ;;
     "distance --method") COMPREPLY=($(compgen -W "exact swept thesis " -- "$cur")); return ;;
@@ -40,7 +41,7 @@ _osteo() {
     import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
-    resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;
+    resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
     mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
