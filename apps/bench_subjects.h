@@ -22,6 +22,8 @@ inline constexpr std::array kBenchSubjects{
     BenchSubject{"haptics-fuzz", "random poses through the whole renderer; not part of all", false},
     BenchSubject{"haptics-hands", "what a tick of 1, 2 and 4 hands costs; not part of all", false},
     BenchSubject{"removal", "what is removed against what the burr swept"},
+    BenchSubject{"slices", "bone from thick slices, against exact bodies"},
+    BenchSubject{"registration", "a second scan onto the first, against known motions and SimpleITK"},
     BenchSubject{"geometry", "distances, voxels, tetrahedra, curves, masks, skins"},
 };
 

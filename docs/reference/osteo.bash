@@ -5,12 +5,14 @@ _osteo() {
     COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare scene plan rehearse replay export sound devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare report approve scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare edit scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
     "crop --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "threshold --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
+    "resample --between") COMPREPLY=($(compgen -W "automatic values outlines " -- "$cur")); return ;;
     "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
     "distance --region") COMPREPLY=($(compgen -W "box interior band " -- "$cur")); return ;;
     "distance --method") COMPREPLY=($(compgen -W "exact swept thesis " -- "$cur")); return ;;
@@ -24,6 +26,7 @@ _osteo() {
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
+    "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
@@ -44,6 +47,7 @@ _osteo() {
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     apply-edits) flags="$flags --xml --describe --labels --structures-out --edits-out" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;
+    resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
     mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
@@ -61,6 +65,7 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
+    register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;

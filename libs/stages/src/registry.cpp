@@ -8,6 +8,7 @@
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
 #include "osteo/stages/segment.h"
+#include "osteo/stages/register.h"
 #include "osteo/stages/snapshot.h"
 #include "osteo/stages/tissue.h"
 
@@ -40,6 +41,7 @@ Registry osteo_stages() {
   registry.add<StructuresStage>();
   registry.add<TubeStage>();
   registry.add<FindStructuresStage>();
+  registry.add<RegisterStage>();
   registry.add<PhantomStage>();
   return registry;
 }

@@ -229,6 +229,114 @@ TEST(Resample, WallThinnerThanAVoxelStaysWhole) {
   EXPECT_LT(area, 1.8);
 }
 
+// Half the space below a plane, in slices of `z` mm that are as thick as they lie apart.
+Image below_a_plane(Vec3 n, double z) {
+  Frame f;
+  f.spacing_mm = {0.8, 0.8, z};
+  f.dims = {50, 50, static_cast<int>(40 / z)};
+  f.origin_mm = {-19.7, -19.6, -19.6};
+  const auto v = make_voxels<std::int16_t>(f.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < f.dims[2]; ++k)
+    for (int j = 0; j < f.dims[1]; ++j)
+      for (int i = 0; i < f.dims[0]; ++i) {
+        double share = 0;
+        for (int s = 0; s < 16; ++s) {
+          const double d = -dot(f.world_from_index({double(i), double(j), k + (s + 0.5) / 16 - 0.5}), n);
+          share += 0.5 * (1 + std::erf(d / (0.5 * std::sqrt(2.0)))) / 16;
+        }
+        v[at++] = static_cast<std::int16_t>(std::lround(1000 * share));
+      }
+  return {f, v};
+}
+
+// How far the half-full density lies from the plane, along lines across it: a terrace swings about it.
+double terrace_mm(const SparseGrid& bone, Vec3 n) {
+  const GridSampler density(bone);
+  const Vec3 u = any_perpendicular(n), w = cross(n, u);
+  double sum = 0;
+  int lines = 0;
+  for (double a = -10; a <= 10; a += 0.43)
+    for (double b = -10; b <= 10; b += 0.43, ++lines) {
+      double filled = 0;  // length of bone along the line, from 4 mm within
+      for (double c = -4; c < 4; c += 0.05) filled += 0.05 * static_cast<double>(density.nearest(u * a + w * b + n * c));
+      sum += std::abs(filled - 4);
+    }
+  return sum / lines;
+}
+
+TEST(Resample, OutlinesMakeNoTerraces) {
+  for (const double degrees : {25.0, 45.0, 65.0}) {
+    const double a = degrees * M_PI / 180;
+    const Vec3 n = normalized({std::sin(a), 0.1, std::cos(a)});
+    for (const double z : {2.0, 4.0}) {
+      const Image ct = below_a_plane(n, z);
+      ThresholdParams t;
+      t.lower = 500;
+      const Labels mask = threshold(ct, t);
+      const auto by = [&](Between between) {
+        ResampleParams p;
+        p.lower = 500;
+        p.between = between;
+        return resample_bone(ct, mask, p);
+      };
+      const double values = terrace_mm(by(Between::values).density, n), outlines = terrace_mm(by(Between::outlines).density, n);
+      EXPECT_LT(outlines, std::max(0.6 * values, 0.05)) << degrees << " degrees, slices of " << z;
+      EXPECT_LT(outlines, 0.1) << degrees << " degrees, slices of " << z;
+      EXPECT_EQ(to_bricks(by(Between::automatic).density).hash(), to_bricks(by(Between::outlines).density).hash());
+    }
+  }
+}
+
+TEST(Resample, OutlinesOfEvenVoxelsAreOffByDefault) {
+  const Image ct = ball(1, 12);
+  ThresholdParams t;
+  t.lower = 500;
+  const Labels mask = threshold(ct, t);
+  const auto by = [&](Between between) { return to_bricks(resample_bone(ct, mask, {.lower = 500, .between = between}).density).hash(); };
+  EXPECT_EQ(by(Between::automatic), by(Between::values));
+  EXPECT_NE(by(Between::automatic), by(Between::outlines));
+}
+
+// A body that ends level with the slices: its end lies where partial volume has it, not a slice off.
+TEST(Resample, OutlinesLeaveLevelEndsWhereTheyAre) {
+  const Vec3 level{0, 0, 1};
+  for (const double z : {2.0, 3.0}) {
+    const Image ct = below_a_plane(level, z);
+    ThresholdParams t;
+    t.lower = 500;
+    const Labels mask = threshold(ct, t);
+    ResampleParams p;
+    p.lower = 500;
+    p.between = Between::values;
+    const double values = resample_bone(ct, mask, p).volume_after_mm3;
+    p.between = Between::outlines;
+    EXPECT_NEAR(resample_bone(ct, mask, p).volume_after_mm3, values, 1e-6 * values) << z;
+  }
+}
+
+// Whatever axis the slices are stacked along.
+TEST(Resample, OutlinesOfSlicesAlongAnyAxis) {
+  const Vec3 n = normalized({0.7, 0.1, 0.7});
+  const Image ct = below_a_plane(n, 3);
+  Image turned;
+  turned.frame = ct.frame;
+  for (std::size_t a = 0; a < 3; ++a) {
+    turned.frame.dims[a] = ct.frame.dims[(a + 2) % 3];
+    turned.frame.spacing_mm[a] = ct.frame.spacing_mm[(a + 2) % 3];
+    turned.frame.direction.column[a] = ct.frame.direction.column[(a + 2) % 3];
+  }
+  const auto v = make_voxels<std::int16_t>(ct.frame.voxel_count());
+  turned.voxels = v;
+  for (int k = 0; k < ct.frame.dims[2]; ++k)
+    for (int j = 0; j < ct.frame.dims[1]; ++j)
+      for (int i = 0; i < ct.frame.dims[0]; ++i) v[turned.offset(k, i, j)] = ct.at(i, j, k);
+  ThresholdParams t;
+  t.lower = 500;
+  const auto by = [&](const Image& image) { return resample_bone(image, threshold(image, t), {.lower = 500}).density; };
+  EXPECT_NEAR(terrace_mm(by(turned), n), terrace_mm(by(ct), n), 1e-3);
+}
+
 TEST(Resample, FindsTheThresholdOfTheMask) {
   const Image ct = ball(1, 20.3);
   for (const double lower : {350.0, 500.0, 720.0}) {

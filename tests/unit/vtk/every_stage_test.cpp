@@ -55,6 +55,7 @@ const std::map<std::string, Recipe>& table() {
       {"fem", {{}, {{"problem", kProblem}}, {}, {"report"}}},
       {"calibrate", {{}, {{"problem", kProblem}}, {}, {"constants", "course"}}},
       {"simulate", {{{"seconds", "0.02"}}, {{"problem", kProblem}}, {}, {"report"}}},
+      {"register", {{{"finest_mm", "4"}}, {}, {"labels"}}},
       {"saw", {{{"normal", "0,0,1"}}, {}, {}}},
       {"curve", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
       {"tube", {{{"points_mm", "53.4,25.9,-15.6; 48,24,-28"}, {"max_radius_mm", "5"}, {"name", "sigmoid sinus"}}, {}, {"line"}}},

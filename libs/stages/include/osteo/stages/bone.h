@@ -12,6 +12,11 @@ struct ResampleStage {
     visit({"spacing_mm", "edge of the output voxels", "mm", 0.05, 10}, p.spacing_mm);
     visit({"lower", "HU at the boundary of bone (0: the value that fits the mask best, the --lower of threshold)", "HU", -32768, 32767},
           p.lower);
+    visit({"between",
+           "how the boundary runs from slice to slice: values takes interpolated HU, which makes a step where slices lie far apart; "
+           "outlines moves "
+           "the slices' outlines into each other; automatic: outlines where slices lie over 1.3 times as far apart as pixels"},
+          p.between);
     visit({"box_mm", "only a box of this size: a region of interest in a coarser bone (0,0,0: all)", "mm", 0, 1000}, p.box_mm);
     visit({"centre_mm", "middle of the box, LPS", "mm"}, p.centre_mm);
     visit({"align_mm", "edge of the voxels of that coarser bone; the box grows to their faces", "mm", 0.05, 10}, p.align_mm);

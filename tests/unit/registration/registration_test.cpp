@@ -1,0 +1,308 @@
+#include "osteo/registration/register.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <numbers>
+#include <sstream>
+
+#include "osteo/base/error.h"
+#include "osteo/dicom/import.h"
+#include "osteo/image/crop.h"
+#include "osteo/image/phantom.h"
+#include "second_scan.h"
+
+namespace osteo {
+namespace {
+
+using test::scanned_again;
+using test::SecondScan;
+using test::target_error_mm;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+Phantom head(double spacing, double noise, int individual = 0) {
+  PhantomParams p;
+  p.spacing_mm = spacing;
+  p.noise_hu = noise;
+  p.individual = individual;
+  return make_phantom(p);
+}
+const Phantom& clean() {
+  static const Phantom p = head(2, 0);
+  return p;
+}
+Image noisy(const Image& image, double hu, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, hu);
+  const auto v = make_voxels<std::int16_t>(image.frame.voxel_count());
+  for (std::size_t i = 0; i < image.frame.voxel_count(); ++i)
+    v[i] = static_cast<std::int16_t>(std::lround(image.voxels[i] + normal(random)));
+  return {image.frame, v};
+}
+const Image& first() {
+  static const Image image = noisy(clean().ct, 20, 1);
+  return image;
+}
+
+RigidTransform motion(Vec3 axis, double degrees, Vec3 shift) {
+  RigidTransform t = rotation_about({5, -10, 3}, normalized(axis), degrees * kDegree);
+  t.shift_mm += shift;
+  return t;
+}
+
+// Left and right changed: the other side of somebody.
+Image mirrored(const Image& image) {
+  Image out = image;
+  const auto v = make_voxels<std::int16_t>(image.frame.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < image.frame.dims[2]; ++k)
+    for (int j = 0; j < image.frame.dims[1]; ++j)
+      for (int i = 0; i < image.frame.dims[0]; ++i) v[at++] = image.at(image.frame.dims[0] - 1 - i, j, k);
+  out.voxels = v;
+  return out;
+}
+
+struct PairCase {
+  const char* name;
+  SecondScan second;
+  RegisterMethod method;
+  bool mr = false;
+};
+
+class PhantomPair : public testing::TestWithParam<PairCase> {};
+
+TEST_P(PhantomPair, IsFoundToAThirdOfAMillimetre) {
+  const PairCase& c = GetParam();
+  const Image second = scanned_again(c.mr ? test::as_mr(clean().labels) : clean().ct, c.second);
+  RegisterParams p;
+  p.method = c.method;
+  const auto begin = std::chrono::steady_clock::now();
+  const Registration r = register_scans(first(), second, p);
+  const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double error = target_error_mm(c.second.second_from_first, r.second_from_first, {0, 0, 0}, 60);
+  std::printf("%s: target %.3f mm, there and back %.3f, edges median %.2f p90 %.2f found %.2f, overlap %.2f, %.2f s\n", c.name, error,
+              r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.residual.found, r.overlap, s);
+  EXPECT_LT(error, 0.3);
+  EXPECT_LT(r.inverse_mm, 0.5);
+  EXPECT_GT(r.residual.found, 0.6);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Register, PhantomPair,
+    testing::Values(
+        PairCase{"turned30", {.second_from_first = motion({1, 2, -1}, 30, {40, -25, 15}), .spacing_mm = {2, 2, 2}}, RegisterMethod::mutual},
+        PairCase{"thick_drilled",
+                 {.second_from_first = motion({0, 1, 3}, -20, {-30, 10, 38}),
+                  .spacing_mm = {1.5, 1.5, 3},
+                  .cavity_mm = {58, 12, -20},
+                  .cavity_radius_mm = 12},
+                 RegisterMethod::mutual},
+        PairCase{"thick5", {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {2, 2, 5}}, RegisterMethod::mutual},
+        PairCase{"mr4",
+                 {.second_from_first = motion({1, 1, 0}, 10, {5, 8, 10}), .spacing_mm = {2, 2, 4}, .air = 30},
+                 RegisterMethod::mutual,
+                 true},
+        PairCase{"mr",
+                 {.second_from_first = motion({-1, 1, 1}, 25, {20, 30, -30}), .spacing_mm = {1.8, 1.8, 2.4}, .air = 30},
+                 RegisterMethod::mutual,
+                 true},
+        PairCase{"bone",
+                 {.second_from_first = motion({1, 0, 1}, 22, {-20, 30, -30}),
+                  .spacing_mm = {2, 2, 2.5},
+                  .cavity_mm = {58, 12, -20},
+                  .cavity_radius_mm = 12},
+                 RegisterMethod::surface}),
+    [](const auto& one) { return std::string(one.param.name); });
+
+std::string refusal(const Image& a, const Image& b, const RegisterParams& p = {}) {
+  try {
+    const Registration r = register_scans(a, b, p);
+    std::printf("accepted: edges median %.2f p90 %.2f found %.2f points %d, back %.2f, overlap %.2f\n", r.residual.median_mm,
+                r.residual.p90_mm, r.residual.found, r.residual.points, r.inverse_mm, r.overlap);
+    return "accepted";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::failed);
+    std::printf("%s\n", e.what());
+    return e.what();
+  }
+}
+
+TEST(RegisterRefuses, AnotherPatient) {
+  // A head of other proportions, and the ears of others.
+  Image other = noisy(clean().ct, 20, 2);
+  other.frame.spacing_mm = {2 * 1.03, 2 * 0.97, 2 * 1.01};
+  EXPECT_NE(refusal(first(), other).find("another patient"), std::string::npos);
+}
+
+// Two people, each whole head on a real scanner, and a skull of plastic.
+TEST(RegisterRefuses, RealHeadsOfOthers) {
+  const auto data = std::filesystem::path(OSTEO_SHARED_DATA);
+  if (!std::filesystem::exists(data / "ct_head_unc") || !std::filesystem::exists(data / "dicom_ct_head_tilt_gaps"))
+    GTEST_SKIP() << "no real heads at hand";
+  std::filesystem::path unc;
+  for (const auto& f : std::filesystem::directory_iterator(data / "ct_head_unc"))
+    if (f.path().extension() == ".nrrd") unc = f.path();
+  ImportParams lpi;
+  lpi.axes = "LPI";
+  const Image head = import_ct(unc, lpi).image;
+  RegisterParams p;
+  p.finest_mm = 2;
+  EXPECT_NE(refusal(head, import_ct(data / "dicom_ct_head_tilt_gaps", {}).image, p), "accepted");
+  EXPECT_NE(refusal(head, import_ct(data / "dicom_ct_skull_phantom" / "S21570" / "S2030", {}).image, p), "accepted");
+}
+
+// The phantom's individuals differ in their ears alone: most edges do meet, and it says that others do not.
+TEST(Register, TellsOfEdgesThatDoNotMeet) {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 1.2;
+  const Image ear = make_phantom(p).ct;
+  p.individual = 3;
+  const Image other = make_phantom(p).ct;
+  std::string warned;
+  Context context;
+  context.on_log([&](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) warned += text;
+  });
+  static_cast<void>(register_scans(ear, other, {}, context));
+  EXPECT_NE(warned.find("another patient"), std::string::npos);
+}
+
+TEST(RegisterRefuses, TheOtherSide) {
+  const Box left = find_region(first(), {.region = Region::left_temporal}),
+            right = find_region(first(), {.region = Region::right_temporal});
+  EXPECT_NE(refusal(crop(first(), left), crop(clean().ct, right)), "accepted");
+  EXPECT_NE(refusal(crop(first(), left), mirrored(crop(first(), left))), "accepted") << "as if a file had left and right changed";
+}
+
+TEST(RegisterRefuses, NoOverlap) {
+  // The vault and the chin: whatever lies upon what, it is not the same.
+  const Image top = crop(first(), {{-90, -110, 55}, {90, 110, 95}}), chin = crop(first(), {{-60, -110, -115}, {60, -20, -70}});
+  EXPECT_NE(refusal(top, chin), "accepted");
+}
+
+TEST(RegisterRefuses, TooLittleToGoBy) {
+  Image air = first();
+  const auto v = make_voxels<std::int16_t>(air.frame.voxel_count());
+  std::mt19937 random(3);
+  for (std::size_t i = 0; i < air.frame.voxel_count(); ++i) v[i] = static_cast<std::int16_t>(-1000 + static_cast<int>(random() % 40));
+  air.voxels = v;
+  EXPECT_NE(refusal(first(), air), "accepted");
+  RegisterParams p;
+  p.method = RegisterMethod::surface;
+  p.bone_hu = 3000;
+  EXPECT_NE(refusal(first(), clean().ct, p).find("too little to go by"), std::string::npos);
+}
+
+TEST(Register, PoorIsAcceptedWhenAskedFor) {
+  RegisterParams p;
+  p.accept_poor = true;
+  p.finest_mm = 4;
+  EXPECT_GT(register_scans(first(), mirrored(noisy(clean().ct, 20, 3)), p).residual.points, 0);
+}
+
+TEST(Register, AnEarIsFoundInAHead) {
+  const Image ear = crop(first(), find_region(first(), {.region = Region::left_temporal}));
+  const SecondScan s{.second_from_first = motion({1, 1, 0}, 12, {15, -20, 10}), .spacing_mm = {2, 2, 2}};
+  const Registration r = register_scans(ear, scanned_again(clean().ct, s), {});
+  EXPECT_LT(target_error_mm(s.second_from_first, r.second_from_first, ear.frame.centre_mm(), 25), 0.4);
+  EXPECT_GT(r.overlap, 0.9);
+}
+
+TEST(Register, SameBytesForAnyThreadCount) {
+  const SecondScan s{.second_from_first = motion({1, 1, 0}, 12, {15, -20, 10}), .spacing_mm = {3, 3, 3}};
+  const Image second = scanned_again(clean().ct, s);
+  RegisterParams p;
+  p.finest_mm = 4;
+  p.accept_poor = true;
+  Context one, two;
+  one.threads = 1;
+  two.threads = 2;
+  const Registration a = register_scans(first(), second, p, one), b = register_scans(first(), second, p, two);
+  EXPECT_EQ(itk_transform_text(a.second_from_first), itk_transform_text(b.second_from_first));
+  EXPECT_EQ(a.residual.median_mm, b.residual.median_mm);
+}
+
+TEST(Register, LabelsAndValuesAreCarriedOver) {
+  const SecondScan s{.second_from_first = motion({1, 0, 2}, 15, {8, 5, -12}), .spacing_mm = {2, 2, 2}, .noise = 0};
+  const Image second = scanned_again(clean().ct, s);
+  // Bone of the second scan, carried over, against the bone of the first.
+  const auto v = make_voxels<std::uint8_t>(second.frame.voxel_count());
+  for (std::size_t i = 0; i < second.frame.voxel_count(); ++i) v[i] = second.voxels[i] >= 500 ? 3 : 0;
+  Labels labels{{second.frame, v}, {{3, "bone", {1, 2, 3}}}};
+  const Labels carried = moved_onto(first().frame, labels, s.second_from_first);
+  ASSERT_EQ(carried.structures, labels.structures);
+  std::size_t both = 0, either = 0;
+  for (std::size_t i = 0; i < first().frame.voxel_count(); ++i) {
+    const bool a = clean().ct.voxels[i] >= 500, b = carried.voxels[i] == 3;
+    both += a && b;
+    either += a + b;
+  }
+  EXPECT_GT(2.0 * static_cast<double>(both) / static_cast<double>(either), 0.85);
+  const Image moved = moved_onto(first().frame, second, s.second_from_first);
+  double off = 0;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < moved.frame.voxel_count(); i += 7, ++n) off += std::abs(moved.voxels[i] - clean().ct.voxels[i]);
+  EXPECT_LT(off / static_cast<double>(n), 25);
+  // Outside the second scan there is air.
+  const Labels nothing = moved_onto(first().frame, labels, motion({1, 0, 0}, 0, {5000, 0, 0}));
+  EXPECT_TRUE(std::ranges::all_of(nothing.span(), [](auto x) { return x == 0; }));
+}
+
+TEST(Register, ItkTransformHoldsTheMatrixByRows) {
+  const RigidTransform t = motion({1, 2, 3}, 20, {4, 5, 6});
+  std::istringstream text(itk_transform_text(t));
+  std::string line;
+  std::getline(text, line);
+  EXPECT_EQ(line, "#Insight Transform File V1.0");
+  while (std::getline(text, line) && line.rfind("Parameters:", 0) != 0) {
+  }
+  std::istringstream numbers(line.substr(11));
+  std::array<double, 12> m{};
+  for (double& x : m) ASSERT_TRUE(numbers >> x);
+  const Vec3 p{10, -20, 30}, q = t(p);
+  for (std::size_t r = 0; r < 3; ++r) EXPECT_NEAR(m[3 * r] * p.x + m[3 * r + 1] * p.y + m[3 * r + 2] * p.z + m[9 + r], q[r], 1e-9);
+}
+
+TEST(Register, CheckerboardShowsBoth) {
+  const Picture same = checkerboard(first(), first(), {});
+  EXPECT_EQ(same.width, 1212);
+  const Picture apart = checkerboard(first(), first(), motion({1, 0, 0}, 0, {40, 0, 0}));
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < same.rgb.size(); ++i) differ += same.rgb[i] != apart.rgb[i];
+  EXPECT_GT(differ, same.rgb.size() / 20);
+  EXPECT_LT(differ, same.rgb.size() * 6 / 10);  // the first's squares are as they were
+}
+
+// The skull phantom of a real scanner, straight at 1 mm and tilted at 2.4 mm.
+TEST(Register, RealSkullStraightAndTilted) {
+  const auto data = std::filesystem::path(OSTEO_SHARED_DATA) / "dicom_ct_skull_phantom";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no real skull phantom at hand";
+  const Image straight = import_ct(data / "S21570" / "S2030", {}).image, tilted = import_ct(data / "S21610" / "S2010", {}).image;
+  std::array<RigidTransform, 2> found;
+  for (const RegisterMethod method : {RegisterMethod::mutual, RegisterMethod::surface}) {
+    RegisterParams p;
+    p.method = method;
+    const auto begin = std::chrono::steady_clock::now();
+    const Registration r = register_scans(straight, tilted, p);
+    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    std::printf(
+        "method %d: turned %.2f deg, moved %.2f mm, there and back %.3f, edges %.2f p90 %.2f found %.2f, surface %.3f p95 %.3f shape %.3f, "
+        "shift %.3f, %.2f s\n",
+        static_cast<int>(method), r.rotation_deg, r.shift_mm, r.inverse_mm, r.residual.median_mm, r.residual.p90_mm, r.residual.found,
+        r.surface_mean_mm, r.surface_p95_mm, r.surface_shape_mm, r.boundary_shift_mm, s);
+    EXPECT_LT(r.inverse_mm, 0.3);
+    EXPECT_LT(r.residual.median_mm, 0.5);
+    found[static_cast<std::size_t>(method)] = r.second_from_first;
+  }
+  // Two methods that share nothing but the first guess.
+  const double apart = target_error_mm(found[0], found[1], straight.frame.centre_mm(), 50);
+  std::printf("the two methods lie %.3f mm apart\n", apart);
+  EXPECT_LT(apart, 0.3);
+}
+
+}  // namespace
+}  // namespace osteo
