@@ -30,6 +30,8 @@ cli::Program make_osteo_program() {
   p.add<ConvertCommand>();
   p.add<RunCommand>();
   p.add<PrepareCommand>();
+  p.add<HandOverCommand>();
+  p.add<TakeBackCommand>();
   p.add<SceneCommand>();
   p.add<PlanCommand>();
   p.add<RehearseCommand>();

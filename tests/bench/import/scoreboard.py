@@ -73,7 +73,7 @@ def slice_is_right(volume, s, gap):
         k = np.rint(index).astype(int)
         if np.any(k < 0) or np.any(k >= np.array(volume.values.shape[::-1])): return False
         found = volume.values[k[:, 2], k[:, 1], k[:, 0]]
-        return bool(np.abs(found - true)[s.measured.ravel()[at]].max() <= 0.51)
+        if np.abs(found - true)[s.measured.ravel()[at]].max() <= 0.51: return True
 
     def off(shift):
         found = volume.sample(volume.index_of(points + shift))
