@@ -95,10 +95,7 @@ std::map<std::string, std::string> notes_from(const Labels& labels, const std::m
     notes[key + "Extent"] = box;
     std::string all = "Segmentation.Status:inprogress|";
     for (const auto& [tag, value] : tags) all += tag + ':' + value + '|';
-    if (!tags.empty()) {
-      std::replace(name.begin(), name.end(), '|', '/');
-      all += std::string(kStructureTag) + ':' + name + '|';
-    }
+    if (!tags.empty()) all += std::string(kStructureTag) + ':' + tag_value(name) + '|';
     notes[key + "Tags"] = all;
   }
   notes["Segmentation_MasterRepresentation"] = "Binary labelmap";

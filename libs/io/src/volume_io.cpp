@@ -91,6 +91,11 @@ std::variant<Image, Labels> load_volume(const fs::path& path, const Context& con
 void save_image(const Image& image, const fs::path& path) {
   save_volume(image, io::Scalar::i16, path);
 }
+std::string tag_value(std::string text) {
+  std::replace(text.begin(), text.end(), '|', '/');
+  return text;
+}
+
 void save_segments(const Labels& labels, const fs::path& path, const std::map<std::string, std::string>& tags) {
   if (!path.filename().string().ends_with(".seg.nrrd"))
     throw Error(ExitCode::usage, "'" + path.filename().string() + "': segments are written as .seg.nrrd");

@@ -121,7 +121,7 @@ std::string percent(double share) {
 
 std::string known_as(const Segment& s) {
   const auto tag = s.tags.find(std::string(kStructureTag));
-  return tag == s.tags.end() ? s.name : tag->second;
+  return tag == s.tags.end() ? tag_value(s.name) : tag->second;
 }
 
 // What comes back, each file by itself: segments in place, and which were there before.
@@ -277,16 +277,21 @@ class Taker {
   void take_structures(TakenBack& back) {
     const Frame& frame = frame_of_structures();
     const std::size_t n = frame.voxel_count();
-    std::map<std::string, std::vector<std::uint8_t>> before;
+    struct Old {
+      std::string name;
+      std::vector<std::uint8_t> mask;
+    };
+    std::map<std::string, Old> before;  // by what their tags say
     if (images_.structures) {
       const Labels& old = *images_.structures;
       const Onto onto(frame, old.frame);
       for (const Structure& s : old.structures) {
         std::vector<std::uint8_t> one(old.frame.voxel_count());
         for (std::size_t v = 0; v < one.size(); ++v) one[v] = old.voxels[v] == s.value ? 1 : 0;
-        auto& mask = before[s.name];
-        mask.resize(n);
-        onto.each(one.data(), [&](std::size_t v) { mask[v] = 1; });
+        Old& kept = before[tag_value(s.name)];
+        kept.name = s.name;
+        kept.mask.resize(n);
+        onto.each(one.data(), [&](std::size_t v) { kept.mask[v] = 1; });
       }
     }
     auto voxels = make_voxels<std::uint8_t>(n);
@@ -297,10 +302,10 @@ class Taker {
     for (const Segment* s : structures_) {
       const auto after = placed(*s, frame);
       const auto old = before.find(known_as(*s));
-      SegmentChange c = compare(old == before.end() ? none.data() : old->second.data(), after.data(), n, frame.voxel_volume_mm3());
+      SegmentChange c = compare(old == before.end() ? none.data() : old->second.mask.data(), after.data(), n, frame.voxel_volume_mm3());
       c.name = s->name;
       if (old != before.end()) {
-        c.was = old->first;
+        c.was = old->second.name;
         before.erase(old);
       }
       if (c.after_mm3 > 0) {
@@ -317,9 +322,9 @@ class Taker {
       }
       back.changes.push_back(std::move(c));
     }
-    for (const auto& [name, mask] : before) {
-      SegmentChange c = compare(mask.data(), none.data(), n, frame.voxel_volume_mm3());
-      c.was = name;
+    for (const auto& [tag, kept] : before) {
+      SegmentChange c = compare(kept.mask.data(), none.data(), n, frame.voxel_volume_mm3());
+      c.was = kept.name;
       back.changes.push_back(std::move(c));
     }
     if (overlap > 0) context_.warn(std::to_string(overlap) + " voxels belong to several structures; the last one keeps them");

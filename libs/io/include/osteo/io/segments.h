@@ -15,6 +15,9 @@ namespace osteo {
 /// Tag of a segment that holds the name under which it was written, whatever it is called since.
 inline constexpr std::string_view kStructureTag = "Osteotome.Structure";
 
+/// A text as the value of a tag: the bar parts tags.
+[[nodiscard]] std::string tag_value(std::string text);
+
 struct Segment {
   std::string id, name;
   std::array<std::uint8_t, 3> rgb{0, 0, 0};
