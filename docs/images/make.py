@@ -89,6 +89,27 @@ picture("scene.nrrd", "guide-table-before.png", "--mask", "plain.nrrd", "--view"
 picture("scene.nrrd", "guide-table-after.png", "--mask", "table.nrrd", "--view", "left")
 picture("scene.nrrd", "guide-metal-before.png", "--mask", "table.nrrd", "--view", "front", "--centre-mm", at)
 picture("scene.nrrd", "guide-metal-after.png", "--mask", "clean.nrrd", "--view", "front", "--centre-mm", at)
+# There and back: the holder erased outside, as Slicer's segment editor would, in what was handed over.
+osteo("prepare", "scene.nrrd", "-o", "case", "--lower", 500, "--spacing-mm", 1)
+osteo("hand-over", "case", "slicer")
+mask = sitk.ReadImage(str(work / "slicer/bone.seg.nrrd"))
+kept = sitk.GetArrayFromImage(mask)
+kept[holder & (wy > wy.max() - 45)] = 0
+edited = sitk.GetImageFromArray(kept)
+edited.CopyInformation(mask)
+for key in mask.GetMetaDataKeys():
+    edited.SetMetaData(key, mask.GetMetaData(key))
+sitk.WriteImage(edited, str(work / "slicer/bone.seg.nrrd"), useCompression=True)
+shutil.copy(work / "case/preview.png", here / "guide-slicer-out.png")
+osteo("take-back", "case", "slicer")
+shutil.copy(work / "case/preview.png", here / "guide-slicer-back.png")
+
+# A refusal with its picture: the same head without its offset.
+shifted = sitk.Cast(ct + 1024, sitk.sitkInt16)
+sitk.WriteImage(shifted, str(work / "shifted.nrrd"))
+subprocess.run([bin_dir / "osteo", "import", "shifted.nrrd", "o.nrrd", "--quiet"], cwd=work)
+shutil.copy(work / "o.nrrd.verdict.svg", here / "guide-refused.svg")
+
 for preset in ("cortical", "thin"):
     osteo("threshold", "ct.nrrd", preset + ".nrrd", "--preset", preset)
     osteo("crop", "ct.nrrd", "ear.nrrd", "--region", "left_temporal", "--labels", preset + ".nrrd", "--labels-out", "ear-mask.nrrd", "--force")

@@ -6,6 +6,7 @@ _osteo() {
     COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare report approve scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare edit scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare hand-over take-back scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -78,6 +79,9 @@ _osteo() {
     approve) flags="$flags --by --note --withdraw" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh" ;;
     edit) flags="$flags --apply --scan --width --height --state-file" ;;
+    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --hu-offset --pipeline --fresh" ;;
+    hand-over) flags="$flags --source" ;;
+    take-back) flags="$flags --source --by-place --check" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;

@@ -39,6 +39,12 @@ bool another_scan(const CaseUpdate& update) {
   }
 }
 
+// Whether a refusal has drawn it, and not a person.
+bool is_picture_of_verdict(const fs::path& file) {
+  std::error_code ec;
+  return fs::is_regular_file(file, ec) && read_text(file).find("The values of this scan, and where") != std::string::npos;
+}
+
 // Files of the old case that a person has changed are kept at the next state, but not as if they belonged to another scan.
 void set_aside_stale_files(const fs::path& folder, const std::map<std::string, ManifestFile>& before, const Context& context) {
   const auto now = parse_manifest(read_text(folder / "manifest.json"));
@@ -300,6 +306,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       files_before = files_of_case();
     }
     update.commit(make_manifest(update, name, results, recipe));
+    // Of an earlier refusal.
+    if (std::error_code ignored; is_picture_of_verdict(folder / "import.svg")) fs::remove(folder / "import.svg", ignored);
     remember(source.hash, fs::absolute(source.path).string());
     set_aside_stale_files(folder, files_before, io.context);
     if (!as_the_case_holds_them && !structures.path.empty()) remember(structures.hash, fs::absolute(structures.path).string());
@@ -314,6 +322,9 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     io.end_progress();
     if (!is_case && output_exists(update.place(verdict))) {
       write_file(verdict, read_text(update.place(verdict)));
+      const fs::path picture = folder / "import.svg";
+      if (output_exists(update.place(picture)) && (!output_exists(picture) || is_picture_of_verdict(picture)))
+        write_file(picture, read_text(update.place(picture)));
       if (!io.common.quiet) io.err << "what was found is in " << verdict.string() << '\n';
     } else if (!io.common.quiet) {
       io.err << "the case is as it was; --json prints what was found\n";

@@ -19,6 +19,8 @@ cli::Program make_osteo_program() {
   p.add<ReportCommand>();
   p.add<ApproveCommand>();
   p.add<EditCommand>();
+  p.add<HandOverCommand>();
+  p.add<TakeBackCommand>();
   p.add<SceneCommand>();
   p.add<PlanCommand>();
   p.add<RehearseCommand>();

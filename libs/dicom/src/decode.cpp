@@ -119,7 +119,9 @@ bool decode_with_gdcm(const DicomHeader& h, std::span<const char> in, F&& take) 
   };
   try {
     if (jpeg2000) {
+      // Left alone it gives one picture to all cores; here each core has a picture of its own.
       gdcm::JPEG2000Codec codec;
+      codec.SetNumberOfThreadsForDecompression(1);
       return run(codec);
     }
     if (jpeg_ls) {

@@ -190,6 +190,11 @@ void judge(DicomHeader& h, bool has_pixels) {
   }
   if (h.columns <= 0 || h.rows <= 0 || h.columns > 65535 || h.rows > 65535)
     return set_problem(h, code::pixels_damaged, "it states no size");
+  if (h.float_pixels) return set_problem(h, code::no_pixels, "its pixels are no whole numbers (Float Pixel Data), which are not read");
+  if (h.palette) return set_problem(h, code::colour, "a picture in the colours of a palette: its numbers are places in a table");
+  if (h.value_table)
+    return set_problem(h, code::slope_invalid,
+                       "its values go through a table (Modality LUT) and not a slope; Hounsfield units cannot be had");
   if (h.samples != 1) return set_problem(h, code::colour, "a colour picture, such as a screen shot or a dose sheet");
   if (h.bits_allocated != 8 && h.bits_allocated != 16 && h.bits_allocated != 32) {
     return set_problem(h, code::pixels_damaged, std::to_string(h.bits_allocated) + " bits a pixel are not supported");
@@ -246,7 +251,9 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.series_number = meta->Get(DC::SeriesNumber).AsInt();
   h.acquisition = meta->Get(DC::AcquisitionNumber).AsInt();
   h.instance = meta->Get(DC::InstanceNumber).AsInt();
-  h.temporal = text_of(meta, DC::TemporalPositionIdentifier) + "/" + text_of(meta, DC::TriggerTime) + "/" + text_of(meta, DC::KVP);
+  h.time_position = text_of(meta, DC::TemporalPositionIdentifier);
+  h.kvp = text_of(meta, DC::KVP);
+  h.temporal = h.time_position + "/" + text_of(meta, DC::TriggerTime) + "/" + h.kvp;
   h.thickness_mm = meta->Get(DC::SliceThickness).AsDouble();
   h.spacing_tag_mm = meta->Get(DC::SpacingBetweenSlices).AsDouble();
   h.has_tilt_tag = meta->Get(DC::GantryDetectorTilt).GetNumberOfValues() > 0;
@@ -258,7 +265,12 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.bits_stored = meta->Get(DC::BitsStored).AsInt();
   h.high_bit = meta->Get(DC::HighBit).GetNumberOfValues() > 0 ? meta->Get(DC::HighBit).AsInt() : h.bits_stored - 1;
   h.is_signed = meta->Get(DC::PixelRepresentation).AsInt() != 0;
-  h.inverted = text_of(meta, DC::PhotometricInterpretation) == "MONOCHROME1";
+  const std::string photometric = text_of(meta, DC::PhotometricInterpretation);
+  h.inverted = photometric == "MONOCHROME1";
+  h.palette = photometric == "PALETTE COLOR";
+  h.value_table = meta->Get(DC::ModalityLUTSequence).IsValid() && !meta->Get(DC::RescaleSlope).IsValid();
+  // Float Pixel Data (PS3.3 C.7.6.24) has neither of these.
+  h.float_pixels = !meta->Get(DC::BitsStored).IsValid() && !meta->Get(DC::PixelRepresentation).IsValid();
   for (unsigned short group = 0x6000; group <= 0x601E; group = static_cast<unsigned short>(group + 2)) {
     const vtkDICOMValue &bit = meta->Get(vtkDICOMTag(group, 0x0102)), &bits = meta->Get(vtkDICOMTag(group, 0x0100));
     if (!bit.IsValid()) continue;

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "decode.h"
+#include "osteo/base/parallel.h"
 
 namespace osteo::dicom {
 namespace {
@@ -253,24 +254,27 @@ void ValueCount::add(const ValueCount& o) {
   for (std::size_t i = 0; i < o.histogram.size(); ++i) histogram[i] += o.histogram[i];
 }
 
-void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, ValueCount& count) {
+void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, ValueCount& count, int threads) {
   const std::size_t n = h.pixels_per_frame(), columns = static_cast<std::size_t>(h.columns), rows = static_cast<std::size_t>(h.rows);
-  const auto convert = [&](const FrameTarget& t, const auto* stored) {
-    Converter(h, h.frames[static_cast<std::size_t>(t.frame)], count).run(stored, t.out, columns, rows);
+  const auto convert = [&](const FrameTarget& t, const auto* stored, ValueCount& to) {
+    Converter(h, h.frames[static_cast<std::size_t>(t.frame)], to).run(stored, t.out, columns, rows);
   };
   if (h.compressed) {
     const CompressedFrames frames(h);
-    for (const FrameTarget& t : targets) {
+    std::vector<ValueCount> counts(targets.size());
+    parallel_for(targets.size(), 1, threads, [&](std::size_t i, std::size_t) {
+      const FrameTarget& t = targets[i];
       std::vector<std::uint16_t> stored = frames.decode(t.frame);
       // What codecs leave above the sign bit says nothing of the file.
       ValueCount ignored;
       take_stored_bits(h, stored.data(), n, ignored);
       if (h.is_signed) {
-        convert(t, reinterpret_cast<const std::int16_t*>(stored.data()));
+        convert(t, reinterpret_cast<const std::int16_t*>(stored.data()), counts[i]);
       } else {
-        convert(t, stored.data());
+        convert(t, stored.data(), counts[i]);
       }
-    }
+    });
+    for (const ValueCount& c : counts) count.add(c);
     return;
   }
   for (const FrameTarget& t : targets) {
@@ -280,9 +284,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
       read_bytes(h, offset, stored.data(), n);
       take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
-        convert(t, reinterpret_cast<const std::int8_t*>(stored.data()));
+        convert(t, reinterpret_cast<const std::int8_t*>(stored.data()), count);
       } else {
-        convert(t, stored.data());
+        convert(t, stored.data(), count);
       }
       continue;
     }
@@ -292,9 +296,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
       if (h.big_endian) std::transform(stored.begin(), stored.end(), stored.begin(), [](std::uint32_t v) { return __builtin_bswap32(v); });
       take_stored_bits(h, stored.data(), n, count);
       if (h.is_signed) {
-        convert(t, reinterpret_cast<const std::int32_t*>(stored.data()));
+        convert(t, reinterpret_cast<const std::int32_t*>(stored.data()), count);
       } else {
-        convert(t, stored.data());
+        convert(t, stored.data(), count);
       }
       continue;
     }
@@ -304,9 +308,9 @@ void read_frames_hu(const DicomHeader& h, std::span<const FrameTarget> targets, 
     if (h.big_endian) std::transform(words, words + n, words, [](std::uint16_t v) { return __builtin_bswap16(v); });
     take_stored_bits(h, words, n, count);
     if (h.is_signed) {
-      convert(t, t.out);
+      convert(t, t.out, count);
     } else {
-      convert(t, words);
+      convert(t, words, count);
     }
   }
 }

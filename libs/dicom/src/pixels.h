@@ -41,8 +41,8 @@ struct FrameTarget {
 };
 
 /// Each target gets pixels_per_frame() values: HU rounded to whole numbers; kNoValue for padding. A compressed file is
-/// decoded once for all targets. Any thread. Throws PixelError.
-void read_frames_hu(const DicomHeader& header, std::span<const FrameTarget> targets, ValueCount& count);
+/// read once for all targets, and its frames decoded in parallel (`threads` as of parallel_for). Any thread. Throws PixelError.
+void read_frames_hu(const DicomHeader& header, std::span<const FrameTarget> targets, ValueCount& count, int threads = 1);
 
 /// The same for values that are at hand: those of the header's only frame.
 void convert_values(const DicomHeader& header, const std::int16_t* stored, std::int16_t* out, ValueCount& count);

@@ -20,26 +20,34 @@ void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std
   std::vector<ValueCount> counts(list.size());
   std::optional<DamagedFile> damaged;
   std::mutex mutex;
+  // A compressed file of many frames is decoded once, a frame a thread, before the files of single frames are shared out.
+  for (std::size_t f = 0; f < list.size() && !damaged; ++f) {
+    const auto& [index, targets] = list[f];
+    const DicomHeader& h = headers_[index];
+    if (!h.compressed || h.frames.size() < 2) continue;
+    std::vector<std::int16_t>& all = decoded_[index];
+    if (!all.empty()) continue;
+    const std::size_t n = h.pixels_per_frame();
+    std::vector<std::int16_t> pixels(n * h.frames.size());
+    std::vector<FrameTarget> every;
+    for (std::size_t k = 0; k < h.frames.size(); ++k) every.push_back({static_cast<int>(k), pixels.data() + k * n});
+    try {
+      read_frames_hu(h, every, counts[f], context.threads);
+    } catch (const PixelError& e) {
+      damaged = DamagedFile{index, e.what()};
+    }
+    all = std::move(pixels);
+  }
+  if (damaged) throw DamagedFile(*damaged);
   std::atomic<std::size_t> done{0};
   parallel_for(list.size(), 1, context.threads, [&](std::size_t first, std::size_t) {
     const auto& [index, targets] = list[first];
     const DicomHeader& h = headers_[index];
     try {
       if (h.compressed && h.frames.size() > 1) {
-        std::vector<std::int16_t>* all = nullptr;
-        {
-          const std::lock_guard lock(mutex);
-          all = &decoded_[index];
-        }
         const std::size_t n = h.pixels_per_frame();
-        if (all->empty()) {
-          std::vector<std::int16_t> pixels(n * h.frames.size());
-          std::vector<FrameTarget> every;
-          for (std::size_t f = 0; f < h.frames.size(); ++f) every.push_back({static_cast<int>(f), pixels.data() + f * n});
-          read_frames_hu(h, every, counts[first]);
-          *all = std::move(pixels);
-        }
-        for (const FrameTarget& t : targets) std::copy_n(all->data() + static_cast<std::size_t>(t.frame) * n, n, t.out);
+        const std::vector<std::int16_t>& all = decoded_.at(index);
+        for (const FrameTarget& t : targets) std::copy_n(all.data() + static_cast<std::size_t>(t.frame) * n, n, t.out);
       } else {
         read_frames_hu(h, targets, counts[first]);
       }

@@ -177,6 +177,7 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
   }
   const std::string advice = "check the bone threshold by eye ('osteo snapshot'), or ask for a series in Hounsfield units";
   if (turned) {
+    c.histogram = raw;
     v.add(code::hu_wrong_sign, grave, "the values (" + range + ") look like HU with the sign turned: air at " + whole(plus_air.hu),
           "the file states the wrong scale; ask for the original export");
     return;
@@ -191,6 +192,8 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
     // Unsigned pixels whose intercept was left out begin at 0, which is -1024 by custom.
     const double offset = count.hu_min == 0 && low < 80 ? -1024 : std::round(-1000 - low);
     const bool small = std::abs(offset) < 200;
+    c.histogram = raw;
+    c.offset_hu = offset;
     v.add(code::hu_shifted, small ? Severity::warning : grave,
           "the values (" + range + ") look like HU shifted by " + whole(low + 1000) + ": air at " + whole(low) + ", tissue at " +
               whole(low + apart) + "; " + whole(offset) + " HU added to each would put them right",

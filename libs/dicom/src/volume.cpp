@@ -94,7 +94,8 @@ Frame lattice_of(const Placement& p, int columns, int rows, Vec3 h) {
     f.dims[a] = before + static_cast<int>(std::ceil(last / h[a] - 1e-6)) + 1;
     f.origin_mm -= f.direction.column[a] * (before * h[a]);
   }
-  f.dims[2] = static_cast<int>(std::floor(p.slices.back().along_mm / h.z + 1e-6)) + 1;
+  // As in the slice, half a voxel beyond the last centre is still covered.
+  f.dims[2] = static_cast<int>(std::floor(p.slices.back().along_mm / h.z + 0.5)) + 1;
   return f;
 }
 

@@ -10,40 +10,6 @@
 #include "osteo/base/param.h"
 
 namespace osteo::io {
-namespace {
-
-template <class F>
-void visit_scalars(const RawVolume& raw, F&& f) {
-  const void* const p = raw.data.get();
-  switch (raw.type) {
-    case Scalar::u8:
-      f(static_cast<const std::uint8_t*>(p));
-      break;
-    case Scalar::i8:
-      f(static_cast<const std::int8_t*>(p));
-      break;
-    case Scalar::u16:
-      f(static_cast<const std::uint16_t*>(p));
-      break;
-    case Scalar::i16:
-      f(static_cast<const std::int16_t*>(p));
-      break;
-    case Scalar::u32:
-      f(static_cast<const std::uint32_t*>(p));
-      break;
-    case Scalar::i32:
-      f(static_cast<const std::int32_t*>(p));
-      break;
-    case Scalar::f32:
-      f(static_cast<const float*>(p));
-      break;
-    case Scalar::f64:
-      f(static_cast<const double*>(p));
-      break;
-  }
-}
-
-}  // namespace
 
 std::size_t size_of(Scalar type) {
   switch (type) {
@@ -109,10 +75,11 @@ Labels merge_layers(const RawVolume& raw, const std::vector<SegmentNote>& segmen
   visit_scalars(raw, [&](const auto* p) {
     for (std::size_t s = 0; s < segments.size(); ++s) {
       const auto layer = static_cast<std::size_t>(segments[s].layer);
-      if (layer >= layers) throw Error(ExitCode::corrupt, "segment '" + segments[s].structure.name + "' is in a layer that is not there");
+      if (segments[s].layer < 0 || layer >= layers)
+        throw Error(ExitCode::corrupt, "segment '" + segments[s].structure.name + "' is in a layer that is not there");
       Structure named = segments[s].structure;
       for (std::size_t i = 0; i < n; ++i) {
-        if (static_cast<double>(p[i * layers + layer]) != named.value) continue;
+        if (static_cast<double>(p[i * layers + layer]) != segments[s].value) continue;
         overlap += out[i] != 0 ? 1 : 0;
         out[i] = static_cast<std::uint8_t>(s + 1);
       }
@@ -131,7 +98,9 @@ Labels labels_from(const RawVolume& raw, const Context& context) {
   const auto segments = segments_from(raw.notes);
   if (raw.layers != 1) return merge_layers(raw, segments, context);
   std::vector<Structure> structures;
-  for (const SegmentNote& s : segments) structures.push_back(s.structure);
+  for (const SegmentNote& s : segments) {
+    if (s.value >= 1 && s.value <= 255) structures.push_back(s.structure);
+  }
   std::stable_sort(structures.begin(), structures.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
   const std::size_t n = raw.frame.voxel_count();
   if (raw.type == Scalar::u8) {

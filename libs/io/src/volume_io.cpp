@@ -6,6 +6,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
+#include "osteo/io/segments.h"
 #include "raw_volume.h"
 #include "seg_notes.h"
 
@@ -90,6 +91,21 @@ std::variant<Image, Labels> load_volume(const fs::path& path, const Context& con
 void save_image(const Image& image, const fs::path& path) {
   save_volume(image, io::Scalar::i16, path);
 }
+std::string tag_value(std::string text) {
+  std::replace(text.begin(), text.end(), '|', '/');
+  return text;
+}
+
+void save_segments(const Labels& labels, const fs::path& path, const std::map<std::string, std::string>& tags) {
+  if (!path.filename().string().ends_with(".seg.nrrd"))
+    throw Error(ExitCode::usage, "'" + path.filename().string() + "': segments are written as .seg.nrrd");
+  save_volume(labels, io::Scalar::u8, path, io::notes_from(labels, tags));
+}
+
+std::vector<Segment> load_segments(const fs::path& path, const Context& context) {
+  return in_file(path, [&, raw = load_raw(path, context)] { return io::segments_of(raw); });
+}
+
 void save_labels(const Labels& labels, const fs::path& path) {
   const bool named = !labels.structures.empty() || path.filename().string().ends_with(".seg.nrrd");
   save_volume(labels, io::Scalar::u8, path, named ? io::notes_from(labels) : std::map<std::string, std::string>{});

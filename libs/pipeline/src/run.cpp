@@ -224,9 +224,15 @@ class Runner {
       }
     } catch (const ErrorWithDocument& e) {
       const auto it = node.outputs.find(e.port());
-      if (it != node.outputs.end()) save_data(e.document(), written(it->second), context);
+      if (it != node.outputs.end()) {
+        save_data(e.document(), written(it->second), context);
+        if (!e.picture().empty()) {
+          write_file(written(it->second).replace_extension(".svg"), e.picture());
+          context.info("a picture of what was found is in " + fs::path(it->second).replace_extension(".svg").string());
+        }
+      }
       if (pipeline_.nodes.size() == 1) throw;
-      throw ErrorWithDocument(e.in("stage '" + node.id + "'"), e.port(), e.document());
+      throw ErrorWithDocument(e.in("stage '" + node.id + "'"), e.port(), e.document(), e.picture());
     } catch (const Error& e) {
       if (e.code() == ExitCode::cancelled || pipeline_.nodes.size() == 1) throw;
       throw e.in("stage '" + node.id + "'");

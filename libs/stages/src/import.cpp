@@ -26,7 +26,7 @@ std::vector<Data> ImportStage::run(const Params& params, std::span<const Data> i
     Imported imported = import_ct(std::get<Source>(inputs[0]).path, params, context);
     return {std::move(imported.image), Document{to_json(imported.verdict)}};
   } catch (const Refused& e) {
-    throw ErrorWithDocument(e, "verdict", {to_json(e.verdict())});
+    throw ErrorWithDocument(e, "verdict", {to_json(e.verdict())}, picture_of(e.verdict()));
   }
 }
 
@@ -54,7 +54,7 @@ std::vector<Data> ImportBoneStage::run(const Params& params, std::span<const Dat
     ImportedBone bone = import_bone(std::get<Source>(inputs[0]).path, params, context);
     return {bone.density, bone.hu, bone.valid, Document{to_json(bone.verdict)}};
   } catch (const Refused& e) {
-    throw ErrorWithDocument(e, "verdict", {to_json(e.verdict())});
+    throw ErrorWithDocument(e, "verdict", {to_json(e.verdict())}, picture_of(e.verdict()));
   }
 }
 

@@ -36,15 +36,18 @@ struct DicomHeader {
 
   std::string sop_class, modality, image_type, description, kernel, manufacturer, transfer_syntax;
   int series_number = 0, acquisition = 0, instance = 0;
-  std::string temporal;  ///< temporal position, trigger time, tube voltage: what tells two pictures of one place apart
+  std::string time_position, kvp;  ///< temporal position and tube voltage as the file gives them
+  std::string temporal;            ///< temporal position, trigger time, tube voltage: what tells two pictures of one place apart
   double thickness_mm = 0, tilt_tag_deg = 0, spacing_tag_mm = 0;
   bool has_tilt_tag = false, lossy = false;
 
   int columns = 0, rows = 0, samples = 1;
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
-  bool projection = false;                   ///< its pictures show the most (or least) of a slab, or a rendering, not a slice
-  bool is_signed = false, inverted = false;  ///< inverted: MONOCHROME1
-  bool overlay_in_pixels = false;            ///< bits around those of the pixel hold an overlay
+  bool projection = false;                     ///< its pictures show the most (or least) of a slab, or a rendering, not a slice
+  bool is_signed = false, inverted = false;    ///< inverted: MONOCHROME1
+  bool palette = false, float_pixels = false;  ///< colours of a palette; floating-point pixels
+  bool value_table = false;                    ///< a Modality LUT stands in place of slope and intercept
+  bool overlay_in_pixels = false;              ///< bits around those of the pixel hold an overlay
   std::optional<int> padding, padding_limit;
   bool compressed = false, big_endian = false;
   std::uint64_t pixel_offset = 0;  ///< first byte of uncompressed pixels

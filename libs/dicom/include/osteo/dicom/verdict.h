@@ -81,6 +81,9 @@ struct ValueCheck {
   double padding_hu = 0, padding_share = 0;
   double saturated_mm3 = 0, metal_mm3 = 0;
   double rounding_error_hu = 0;  ///< of whole HU: 0 when slope and intercept are whole numbers
+  // What a picture of a refusal shows; kept only where one helps.
+  std::vector<std::uint32_t> histogram;  ///< 4 HU a bin, from -1200
+  double offset_hu = 0;                  ///< that would put the values right
 };
 
 struct Verdict {
@@ -112,6 +115,10 @@ struct Verdict {
 
 /// Pretty-printed, keys in a fixed order. Says nothing that identifies the patient.
 [[nodiscard]] std::string to_json(const Verdict& verdict);
+
+/// The histogram of values that were refused for their scale, where air and tissue should be, and the values with the offset that is
+/// proposed, as SVG. Empty for a verdict without such a finding.
+[[nodiscard]] std::string picture_of(const Verdict& verdict);
 
 /// What a person wants to know of a verdict that was written before.
 struct VerdictSummary {

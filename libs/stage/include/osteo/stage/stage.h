@@ -38,17 +38,20 @@ struct StageInfo {
   std::string example;                  ///< a command line that works
 };
 
-/// An Error of a stage that still has something to show: the runner saves it to the port, if that is wanted, and throws on.
+/// An Error of a stage that still has something to show: the runner saves it to the port, if that is wanted, and throws on. A picture (SVG)
+/// goes beside it, with .svg in place of .json.
 class ErrorWithDocument : public Error {
  public:
-  ErrorWithDocument(const Error& error, std::string port, Document document)
-      : Error(error), port_(std::move(port)), document_(std::move(document)) {}
+  ErrorWithDocument(const Error& error, std::string port, Document document, std::string picture = {})
+      : Error(error), port_(std::move(port)), document_(std::move(document)), picture_(std::move(picture)) {}
   [[nodiscard]] const std::string& port() const { return port_; }
   [[nodiscard]] const Document& document() const { return document_; }
+  [[nodiscard]] const std::string& picture() const { return picture_; }
 
  private:
   std::string port_;
   Document document_;
+  std::string picture_;
 };
 
 /// A stage with its parameters. Not thread-safe; make one for each use.
