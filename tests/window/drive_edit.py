@@ -216,6 +216,7 @@ with Screen("1024x700") as screen:
     assert all((pathlib.Path("copy") / n).read_bytes() == b for n, b in saved.items()), "the copy differs"
     osteo("prepare", "-o", "copy", "--no-edits", "--quiet")
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before and not pathlib.Path("copy/edits.json").exists()
+    assert pathlib.Path("copy/edits-dropped.json").read_bytes() == saved["edits.json"]
     osteo("phantom", "other.nrrd", "--region", "temporal", "--spacing-mm", "1", "--individual", 3, "--quiet")
     osteo("prepare", "other.nrrd", "-o", "other", "--lower", "400", "--spacing-mm", "1", "--quiet")
     assert "another CT" in osteo("edit", "other", "--apply", "case/edits.json", code=2)

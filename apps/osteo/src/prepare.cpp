@@ -340,6 +340,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       }
       files_before = files_of_case();
     }
+    if (!edits) keep_dropped_edits(folder, io.context);
     update.commit(make_manifest(update, name, results, recipe));
     remember(source.hash, fs::absolute(source.path).string());
     set_aside_stale_files(folder, files_before, io.context);
