@@ -214,6 +214,13 @@ with Screen("1024x700") as screen:
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before
     osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
     assert all((pathlib.Path("copy") / n).read_bytes() == b for n, b in saved.items()), "the copy differs"
+    none = json.loads(saved["edits.json"])
+    none["operations"].append({"do": "delete_structure", "structure": 6})
+    none["start_hash"] = "another"  # so that the result is told to be another one
+    pathlib.Path("none.json").write_text(json.dumps(none))
+    assert "look at it" in osteo("edit", "copy", "--apply", "none.json")
+    osteo("scene", "copy")  # structures at risk: none
+    osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
     osteo("prepare", "-o", "copy", "--no-edits", "--quiet")
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before and not pathlib.Path("copy/edits.json").exists()
     assert pathlib.Path("copy/edits-dropped.json").read_bytes() == saved["edits.json"]
@@ -243,6 +250,6 @@ with Screen("1024x700") as screen:
     w.end()
 
 # Nothing of the scan lies about.
-made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd"}
+made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json"}
 assert all(n.startswith("state") or n.endswith(".prov.json") for n in made), made
 print("window edit: all as it should be")

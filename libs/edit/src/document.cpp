@@ -665,7 +665,7 @@ Labels EditDocument::structure_labels(StructureRole role) const {
   Labels out;
   out.frame = state_->ct.frame;
   for (const EditStructure& s : state_->structures) {
-    if (s.role != role) continue;
+    if (s.role != role || volume_mm3(s.is.value) == 0) continue;
     kept[s.is.value] = s.is.value;
     out.structures.push_back(s.is);
   }
