@@ -45,7 +45,13 @@ class Saver {
       std::vector<std::string> args{program.string(), "prepare", scan_.string(), "-o", case_.string(), "--edits", file.string(), "--quiet"};
       if (threads_ != 0) args.push_back("--threads=" + std::to_string(threads_));
       const int code = run(args, said);
-      if (code == 0) return {true, "saved into the case: edits.json, bone.vdb, hu.vdb, surface.ply, preview.png, structures"};
+      if (code == 0) {
+        std::string written;
+        for (const char* const name : {"edits.json", "bone.vdb", "hu.vdb", "surface.ply", "preview.png", "structures.seg.nrrd"}) {
+          if (output_exists(case_ / name)) written += (written.empty() ? "" : ", ") + std::string(name);
+        }
+        return {true, "saved into the case: " + written};
+      }
       std::string text = read_text(said);
       while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
       for (char& c : text) c = c == '\n' ? ' ' : c;

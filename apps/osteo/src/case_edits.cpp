@@ -38,6 +38,13 @@ std::optional<CaseEdits> edits_of_case(const fs::path& folder, const std::option
   return CaseEdits{std::move(file), std::move(edits)};
 }
 
+void keep_dropped_edits(const fs::path& folder, const Context& context) {
+  const fs::path file = folder / "edits.json";
+  if (!output_exists(file)) return;
+  write_file(folder / "edits-dropped.json", read_text(file));
+  context.info("what was done by hand is kept in edits-dropped.json; --edits takes it up again");
+}
+
 void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folder, bool threshold_asked) {
   const MaskNodes at = mask_nodes(pipeline);
   const auto own = threshold_of(edits.recipe);

@@ -305,6 +305,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
       }
       files_before = files_of_case();
     }
+    if (!edits) keep_dropped_edits(folder, io.context);
     update.commit(make_manifest(update, name, results, recipe));
     // Of an earlier refusal.
     if (std::error_code ignored; is_picture_of_verdict(folder / "import.svg")) fs::remove(folder / "import.svg", ignored);

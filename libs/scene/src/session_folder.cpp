@@ -172,7 +172,10 @@ Anatomy anatomy_of(const Case& the_case, HapticSetup& setup, const Context& cont
   setup.structures.clear();
   if (const auto file = the_case.files.find("structures"); file != the_case.files.end()) {
     const auto volume = load_volume(file->second, context);
-    if (const auto* labels = std::get_if<Labels>(&volume)) {
+    const auto* const labels = std::get_if<Labels>(&volume);
+    // Of structures that were all deleted by hand an empty map is left.
+    const auto any = [](std::uint8_t v) { return v != 0; };
+    if (labels != nullptr && std::any_of(labels->span().begin(), labels->span().end(), any)) {
       anatomy.structures = std::make_shared<const StructureMap>(*labels, 8, context);
       setup.structures = anatomy.structures->hash();
     }

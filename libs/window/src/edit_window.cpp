@@ -15,6 +15,7 @@
 
 #include "cut_picture.h"
 #include "edit_control.h"
+#include "edit_overlay.h"
 #include "edit_panel.h"
 #include "edit_scene.h"
 #include "edit_state.h"
@@ -25,8 +26,6 @@ namespace osteo {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr ImU32 kText = IM_COL32(235, 235, 235, 255), kShadow = IM_COL32(0, 0, 0, 200), kCross = IM_COL32(120, 200, 120, 170);
 
 class EditWindow {
  public:
@@ -388,7 +387,7 @@ class EditWindow {
           hi{static_cast<float>(b.x + b.width), static_cast<float>(b.y + b.height)};
       draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(textures_[static_cast<std::size_t>(v)])), lo, hi);
       draw->PushClipRect(lo, hi);
-      annotate(draw, v, lo);
+      annotate_slice(draw, control_, v, lo, scale_);
       draw->PopClipRect();
     }
     if (redraw) {
@@ -406,100 +405,19 @@ class EditWindow {
       if (control_.show_cross) {
         const auto p = scene_->pixel(control_.cross_mm());
         const ImVec2 c{lo.x + static_cast<float>(p[0]), lo.y + static_cast<float>(p[1])};
-        draw->AddCircle(c, 7 * scale_, kCross, 0, 2 * scale_);
+        draw->AddCircle(c, 7 * scale_, kCrossColour, 0, 2 * scale_);
       }
-      text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
-           control_.previewing() ? "3D preview, being made ..."
-           : control_.live()     ? "3D preview of the threshold"
-                                 : "3D preview, coarse");
+      shadowed_text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
+                    control_.previewing() ? "3D preview, being made ..."
+                    : control_.live()     ? "3D preview of the threshold"
+                                          : "3D preview, coarse");
       draw->PopClipRect();
     }
-  }
-
-  void text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = kText) const {
-    draw->AddText({at.x + 1, at.y + 1}, kShadow, words.c_str());
-    draw->AddText(at, ink, words.c_str());
   }
 
   // The crosshair may move within a slice, which stays the same.
   static bool same_picture(const SliceView& a, const SliceView& b) {
     return a.width == b.width && a.height == b.height && a.mm_per_pixel == b.mm_per_pixel && length(a.world(0, 0) - b.world(0, 0)) < 1e-9;
-  }
-
-  // A length is drawn where it lies, not where it is foreshortened.
-  static bool lies_in(const SliceView& view, const std::array<Vec3, 2>& line) {
-    const Vec3 n = normalized(cross(view.world(1, 0) - view.world(0, 0), view.world(0, 1) - view.world(0, 0)));
-    return std::abs(dot(line[0] - view.through_mm, n)) < 0.01 && std::abs(dot(line[1] - view.through_mm, n)) < 0.01;
-  }
-
-  void annotate(ImDrawList* draw, int v, ImVec2 lo) {
-    const SliceView& view = control_.view(v);
-    const auto place = [&](Vec3 mm) {
-      const auto p = view.pixel(mm);
-      return ImVec2{lo.x + static_cast<float>(p[0]) + 0.5F, lo.y + static_cast<float>(p[1]) + 0.5F};
-    };
-    const auto w = static_cast<float>(view.width), h = static_cast<float>(view.height);
-    if (control_.show_cross) {
-      const ImVec2 c = place(control_.cross_mm());
-      const float hole = 12 * scale_;
-      draw->AddLine({lo.x, c.y}, {c.x - hole, c.y}, kCross);
-      draw->AddLine({c.x + hole, c.y}, {lo.x + w, c.y}, kCross);
-      draw->AddLine({c.x, lo.y}, {c.x, c.y - hole}, kCross);
-      draw->AddLine({c.x, c.y + hole}, {c.x, lo.y + h}, kCross);
-    }
-    static constexpr const char* names[] = {"Axial", "Coronal", "Sagittal"};
-    static constexpr const char* letters[] = {"RLAP", "RLHF", "APHF"};  // left, right, top, bottom
-    const auto [slice, slices] = control_.slice(v);
-    text(draw, {lo.x + 8 * scale_, lo.y + 6 * scale_},
-         std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
-    const float line = ImGui::GetFontSize();
-    const ImU32 ink = IM_COL32(255, 225, 140, 255);
-    const auto letter = [&](int i) { return std::string(1, letters[v][i]); };
-    text(draw, {lo.x + 8 * scale_, lo.y + h / 2 - line / 2}, letter(0), ink);
-    text(draw, {lo.x + w - line, lo.y + h / 2 - line / 2}, letter(1), ink);
-    text(draw, {lo.x + w / 2 - line / 4, lo.y + 6 * scale_}, letter(2), ink);
-    text(draw, {lo.x + w / 2 - line / 4, lo.y + h - line - 6 * scale_}, letter(3), ink);
-    // A bar of a round length, about a fifth of the view.
-    double mm = 1;
-    for (const double step : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0}) {
-      if (step / view.mm_per_pixel < view.width / 4.0) mm = step;
-    }
-    const auto bar = static_cast<float>(mm / view.mm_per_pixel);
-    const ImVec2 end{lo.x + w - 14 * scale_, lo.y + h - 12 * scale_};
-    draw->AddLine({end.x - bar, end.y}, end, kText, 2 * scale_);
-    draw->AddLine({end.x - bar, end.y - 5 * scale_}, {end.x - bar, end.y + 1}, kText, 2 * scale_);
-    draw->AddLine({end.x, end.y - 5 * scale_}, {end.x, end.y + 1}, kText, 2 * scale_);
-    char words[48];
-    std::snprintf(words, sizeof words, "%.0f mm", mm);
-    text(draw, {end.x - bar, end.y - line - 6 * scale_}, words);
-
-    if (control_.ruler_mm && lies_in(view, *control_.ruler_mm)) {
-      const auto& r = *control_.ruler_mm;
-      const ImVec2 a = place(r[0]), b = place(r[1]);
-      draw->AddLine(a, b, IM_COL32(255, 120, 120, 255), 2 * scale_);
-      draw->AddCircleFilled(a, 3 * scale_, IM_COL32(255, 120, 120, 255));
-      draw->AddCircleFilled(b, 3 * scale_, IM_COL32(255, 120, 120, 255));
-      std::snprintf(words, sizeof words, "%.1f mm", length(r[1] - r[0]));
-      text(draw, {b.x + 8 * scale_, b.y - line}, words, IM_COL32(255, 150, 150, 255));
-    }
-    if (control_.tool() == EditTool::box) {
-      const auto& l = control_.box_lo_mm;
-      const auto& u = control_.box_hi_mm;
-      const ImVec2 a = place({l[0], l[1], l[2]}), b = place({u[0], u[1], u[2]});
-      const ImVec2 c0{std::min(a.x, b.x), std::min(a.y, b.y)}, c1{std::max(a.x, b.x), std::max(a.y, b.y)};
-      draw->AddRectFilled(c0, c1, IM_COL32(255, 120, 120, 30));
-      draw->AddRect(c0, c1, IM_COL32(255, 120, 120, 255), 0, 0, 2 * scale_);
-    }
-    const bool brushes = control_.tool() == EditTool::brush || control_.tool() == EditTool::eraser;
-    if (brushes && control_.under_mouse()) {
-      // The ball cuts the other slices too, smaller the farther they are.
-      const Vec3 m = *control_.under_mouse();
-      const Vec3 n = cross(view.world(1, 0) - view.world(0, 0), view.world(0, 1) - view.world(0, 0));
-      const double off = dot(m - view.through_mm, normalized(n)), r2 = control_.brush_radius_mm * control_.brush_radius_mm - off * off;
-      if (r2 > 0)
-        draw->AddCircle(place(m), static_cast<float>(std::sqrt(r2) / view.mm_per_pixel),
-                        control_.tool() == EditTool::brush ? IM_COL32(120, 255, 120, 255) : IM_COL32(255, 120, 120, 255), 0, 1.5F * scale_);
-    }
   }
 
   void status_bar() {

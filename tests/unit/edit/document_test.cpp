@@ -249,6 +249,9 @@ TEST(EditDocument, StructuresAreAddedPaintedChangedAndDeleted) {
   ASSERT_EQ(out.structures.size(), 1U);
   EXPECT_EQ(out.structures[0].name, "facial nerve");
   EXPECT_EQ(out.at(20, 15, 10), 1);
+  d.apply(AddStructureEdit{3, "never painted", {1, 2, 3}, StructureRole::at_risk});
+  EXPECT_EQ(d.structure_labels(StructureRole::at_risk).structures.size(), 1U);
+  d.undo();
   d.apply(DeleteStructureEdit{1});
   EXPECT_EQ(d.structure(1), nullptr);
   EXPECT_EQ(d.volume_mm3(1), 0);

@@ -110,7 +110,7 @@ class EditDocument {
   /// As `hash`, of the state at the beginning.
   [[nodiscard]] const std::string& start_hash() const;
 
-  /// For the pipeline: bone as 0 and 1; structures of a role with names and colours.
+  /// For the pipeline: bone as 0 and 1; structures of a role that have voxels, with names and colours.
   [[nodiscard]] Labels bone_labels(int threads = 0) const;
   [[nodiscard]] Labels structure_labels(StructureRole role) const;
 
