@@ -108,7 +108,9 @@ assert "Łucja Żak <x>" in " ".join(page.texts) and wanted <= set(page.pictures
 if poppler:
     assert "Łucja Żak <x>" in pdf_text()
 assert json.loads(osteo("info", "case", "--json")[0])["approval"]["state"] == "valid"
-assert "approved by Łucja Żak <x> on 20" in osteo("info", "case")[0]
+said = osteo("info", "case")[0]
+assert "approved by Łucja Żak <x> on 20" in said and re.search(r"^Asked for .*--lower 500", said, re.M), said
+assert not re.search(r"\d\.\d{6}", said), said  # digits that mean nothing
 osteo("rehearse", "case", "--headless", "--fast", "--seconds", "1", "--require-approved", "-o", "s1", "--quiet")
 assert json.loads((work / "s1/session.json").read_text())["approval"]["state"] == "valid"
 
