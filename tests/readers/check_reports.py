@@ -95,6 +95,12 @@ if poppler:
 else:
     print("PDF not read: no poppler-utils")
 
+# One that another version wrote is made again and has to be looked at first.
+written = html_file.read_bytes()
+html_file.write_bytes(written.replace(b"Not a medical device", b"Not a medical gadget"))
+assert "look at it" in osteo("approve", "case", "--by", "A", code=7)[1]
+assert html_file.read_bytes() == written and not (work / "case/approval.json").exists()
+
 # Approved: nothing but the signature changes, and the scan is not needed for it.
 before = html_file.read_bytes()
 (work / "ct").rename(work / "away")
