@@ -95,6 +95,12 @@ if poppler:
 else:
     print("PDF not read: no poppler-utils")
 
+# One that another version wrote is made again and has to be looked at first.
+written = html_file.read_bytes()
+html_file.write_bytes(written.replace(b"Not a medical device", b"Not a medical gadget"))
+assert "look at it" in osteo("approve", "case", "--by", "A", code=7)[1]
+assert html_file.read_bytes() == written and not (work / "case/approval.json").exists()
+
 # Approved: nothing but the signature changes, and the scan is not needed for it.
 before = html_file.read_bytes()
 (work / "ct").rename(work / "away")
@@ -108,7 +114,9 @@ assert "Łucja Żak <x>" in " ".join(page.texts) and wanted <= set(page.pictures
 if poppler:
     assert "Łucja Żak <x>" in pdf_text()
 assert json.loads(osteo("info", "case", "--json")[0])["approval"]["state"] == "valid"
-assert "approved by Łucja Żak <x> on 20" in osteo("info", "case")[0]
+said = osteo("info", "case")[0]
+assert "approved by Łucja Żak <x> on 20" in said and re.search(r"^Asked for .*--lower 500", said, re.M), said
+assert not re.search(r"\d\.\d{6}", said), said  # digits that mean nothing
 osteo("rehearse", "case", "--headless", "--fast", "--seconds", "1", "--require-approved", "-o", "s1", "--quiet")
 assert json.loads((work / "s1/session.json").read_text())["approval"]["state"] == "valid"
 

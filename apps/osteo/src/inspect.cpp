@@ -4,6 +4,7 @@
 #include <map>
 #include <ostream>
 
+#include "case_pipeline.h"
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -160,8 +161,9 @@ int InfoCommand::run(const Params&, cli::Invocation& io) {
     j["code"] = case_code(path);
     j["approval"] = approval_json(approval_of(path));
     if (!io.common.json) {
-      for (const auto& [name, value] : case_facts(path))
-        io.out << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << value << '\n';
+      auto rows = case_facts(path);
+      if (const auto recipe = read_recipe(path)) rows.emplace_back("Asked for", flags_of(*recipe).substr(1));
+      for (const auto& [name, value] : rows) io.out << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << value << '\n';
       return 0;
     }
   } else {

@@ -102,6 +102,10 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
       throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case as it was before its last change",
                   "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
     }
+    if (output_exists(report_file(folder, ".html")) && make_report(folder, {}, io).says_other) {
+      throw Error(ExitCode::failed, "the report of '" + folder.string() + "' was of another version of the program, and is made again",
+                  "look at it, then approve");
+    }
     approve(folder, p.by, p.note);
   }
   const CaseReport report = make_report(folder, {}, io);

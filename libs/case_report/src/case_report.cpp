@@ -99,6 +99,7 @@ struct Content {
       const std::vector<float> below = thickness_below(*surface, *bone, 5, context);
       thin_percent = 100.0 * static_cast<double>(std::count_if(below.begin(), below.end(), [](float t) { return t < 1; })) /
                      static_cast<double>(below.size());
+      thin_percent = std::round(100 * thin_percent) / 100;  // as the report keeps it: it says the same when it is read back
       draw_thin(subject, below, pictures);
     }
   }
@@ -362,6 +363,11 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
                              const Context& context) {
   CaseReport report{report_file(folder, ".html"), report_file(folder, ".pdf"), false, {}};
   context.progress(0, "report");
+  if (approval_of(folder).state == ApprovalState::valid && has_full_report(folder) &&
+      earlier_html(folder).find("class=\"signature good\"") != std::string::npos) {
+    report.unchanged = true;
+    return report;
+  }
   Content c(folder);
   if (c.structures) c.subject.measures = measure_structures(*c.structures, context);
   const std::string state = state_of(folder), earlier = earlier_html(folder);
@@ -382,7 +388,9 @@ CaseReport write_case_report(const fs::path& folder, const std::string& asked_fo
   s.marks["left-out"] = report.left_out.empty() ? "" : "scan";
   if (c.thin_percent >= 0) s.marks["thin-percent"] = number_text(c.thin_percent, 2);
   context.progress(0.9, "report: pages");
-  const bool wrote_html = write_if_other(report.html, sheet_html(s));
+  const std::string html = sheet_html(s);
+  report.says_other = !earlier.empty() && html_without_signature(earlier) != html_without_signature(html);
+  const bool wrote_html = write_if_other(report.html, html);
   report.unchanged = !write_if_other(report.pdf, sheet_pdf(s)) && !wrote_html;
   context.progress(1.0);
   return report;

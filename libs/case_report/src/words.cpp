@@ -172,7 +172,9 @@ Rows scan_rows(const CaseFacts& f) {
       add("Voxels", number_text(dims->items()[0].number().value_or(0), 0) + " x " + number_text(dims->items()[1].number().value_or(0), 0) +
                         " x " + number_text(dims->items()[2].number().value_or(0), 0));
   }
-  add("Voxel of the scan", edges_text(f.verdict("output", "spacing_mm")));
+  const Json* const made = f.verdict("geometry", "resampled");
+  add(made != nullptr && made->flag() != nullptr && *made->flag() ? "Voxel, resampled" : "Voxel of the scan",
+      edges_text(f.verdict("output", "spacing_mm")));
   if (const std::string axes = text(f.verdict("output", "axes")); !axes.empty()) add("Axes", axes_text(axes));
   if (const std::string given = f.param("import", "axes"); !given.empty())
     add("Orientation", "given by hand as " + given + ": the file does not know it");
@@ -269,6 +271,9 @@ sheet::Table resolution_table(const CaseFacts& f) {
     finest = std::min(finest, v.number().value_or(1));
     coarsest = std::max(coarsest, v.number().value_or(1));
   }
+  // What the scanner took, not what was interpolated between: the widest distance of slices, or their thickness where that is more.
+  if (text(f.verdict("source")) == "DICOM")
+    coarsest = std::max({coarsest, number(f.verdict("geometry", "gap_max_mm")), number(f.verdict("series", "thickness_mm"))});
   // Slices further apart than a structure is wide hide it where it runs within them, however fine their pixels.
   constexpr std::pair<const char*, double> kSmall[] = {
       {"mandibular canal", 2.5}, {"facial canal", 1.3}, {"tegmen, sinus plate", 1.0}, {"wall of an air cell, chorda", 0.5}};

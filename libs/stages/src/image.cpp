@@ -46,7 +46,10 @@ StageInfo ThresholdStage::info() {
       .synopsis = "bone mask from a CT by Hounsfield units",
       .description =
           "Marks the voxels between two HU values, then cleans the mask: table and head holder, streaks near metal, hysteresis, closing, "
-          "filling of cavities, and removal of small pieces, each off unless asked for except the last. With --preset the lower value "
+          "filling of cavities, and removal of small pieces. Small pieces go (--min-volume-mm3 0 keeps them), and table and holder where "
+          "that is "
+          "certain (--keep-table leaves them on; what is left though it may be table is told); the rest is off unless asked for. With "
+          "--preset the lower value "
           "is found from the scan: cortical for thick bone, cellular for the mastoid's walls, thin for the orbit's.",
       .inputs = {{"image", {DataKind::image}, "CT in HU"}},
       .outputs = {{"mask", {DataKind::labels}, "1 in bone, 0 elsewhere"}},

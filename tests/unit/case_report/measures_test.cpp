@@ -173,5 +173,17 @@ TEST(Words, ResolutionGoesByTheCoarsestEdge) {
   EXPECT_EQ(t.rows[3][3].tone, Tone::bad);
 }
 
+TEST(Words, ResolutionIsThatOfTheSlicesNotOfTheVoxelsMadeOfThem) {
+  const TemporaryFolder at;
+  std::ofstream(at.path() / "manifest.json") << R"({"osteotome_case": 1})";
+  std::ofstream(at.path() / "import.json") << R"({"status": "repaired", "source": "DICOM", "series": {"thickness_mm": 4},
+    "geometry": {"gap_max_mm": 7, "resampled": true}, "output": {"spacing_mm": [0.5, 0.5, 0.5]}})";
+  const CaseFacts facts(at.path());
+  const sheet::Table t = resolution_table(facts);
+  ASSERT_EQ(t.rows.size(), 4U);
+  EXPECT_EQ(t.rows[1][2].text, "0.2 to 2.6");
+  for (const auto& row : t.rows) EXPECT_EQ(row[3].tone, Tone::bad) << row[0].text;
+}
+
 }  // namespace
 }  // namespace osteo::case_report

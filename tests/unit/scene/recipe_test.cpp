@@ -62,6 +62,12 @@ TEST(Recipe, WhatBelongsToAChangedThingGoesWithItAndIsTold) {
   EXPECT_FALSE(r.settings.contains("lower"));
   changes = change_settings(r, Given{}, true);
   EXPECT_FALSE(r.settings.contains("names"));
+  r.settings["remove_table"] = "true";
+  changes = change_settings(r, Given{{"keep_table", "true"}}, false);  // both would be refused
+  EXPECT_FALSE(r.settings.contains("remove_table"));
+  EXPECT_FALSE(find(changes, "remove_table")->why.empty());
+  changes = change_settings(r, Given{{"remove_table", "true"}}, false);
+  EXPECT_FALSE(r.settings.contains("keep_table"));
 }
 
 class WithState : public testing::Test {
