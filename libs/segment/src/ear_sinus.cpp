@@ -182,7 +182,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (value > start_value) start_value = value, start = i;
   }
   // Below the lowest place of the groove the vein leaves the skull, and muscles between bones look like grooves too.
-  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 3;
+  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 2;
   constexpr float kFar = std::numeric_limits<float>::max();
   std::vector<float> reached(g.size(), kFar);
   std::vector<float> way_mm(g.size(), 0.0F);
@@ -207,7 +207,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
           if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest) continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
-          const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.05 + worth(to)));
+          const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.03 + worth(to) * worth(to)));
           if (cost < reached[to]) {
             reached[to] = cost;
             way_mm[to] = way_mm[at] + static_cast<float>(step);
@@ -233,7 +233,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (reached[i] == kFar) continue;
     const auto p = g.place(i);
     const Vec3 x = g.world(p[0], p[1], p[2]);
-    if (x.z < lowest || worth(i) < 0.35) continue;
+    if (x.z < lowest || worth(i) < 0.35 || g.v[i] < 0.58F) continue;
     // Upwards it goes backwards too; downwards inward and forward.
     if (x.z > middle.z + 2 && x.y > middle.y - 3 && way_mm[i] > way_mm[up]) up = i;
     if (x.z < middle.z + 4 && x.x < middle.x && x.y < middle.y + 4 && way_mm[i] > way_mm[down]) down = i;

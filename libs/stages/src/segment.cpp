@@ -12,8 +12,9 @@
 namespace osteo {
 namespace {
 
-double rounded(double x, double to) {
-  return std::round(x / to) * to;
+/// To so many decimals; as text it has no more.
+double rounded(double x, double decimals) {
+  return std::round(x * decimals) / decimals;
 }
 
 std::vector<Vec3> parse_points(const std::string& text) {
@@ -67,14 +68,14 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   if ((file != nullptr) == !p.points_mm.empty()) throw Error(ExitCode::usage, "give the tube's points by --points-mm or by --points FILE, not both");
   const std::vector<Vec3> points = file != nullptr ? load_points(file->path) : parse_points(p.points_mm);
   const Tube tube = trace_tube(ct, points, p.tube, context);
-  context.report("length_mm", rounded(tube.length_mm, 0.1));
-  context.report("radius_mean_mm", rounded(tube.radius_mean_mm, 0.01));
-  context.report("radius_min_mm", rounded(tube.radius_min_mm, 0.01));
-  context.report("radius_max_mm", rounded(tube.radius_max_mm, 0.01));
-  context.report("confidence", rounded(tube.confidence, 0.01));
+  context.report("length_mm", rounded(tube.length_mm, 10));
+  context.report("radius_mean_mm", rounded(tube.radius_mean_mm, 100));
+  context.report("radius_min_mm", rounded(tube.radius_min_mm, 100));
+  context.report("radius_max_mm", rounded(tube.radius_max_mm, 100));
+  context.report("confidence", rounded(tube.confidence, 100));
   std::string unsure;
   for (const auto& u : tube.unsure_mm) {
-    unsure += (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 0.1)) + " to " + format_number(rounded(u[1], 0.1));
+    unsure += (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 10)) + " to " + format_number(rounded(u[1], 10));
   }
   if (!unsure.empty()) {
     context.report("unsure_mm", unsure);
@@ -82,8 +83,8 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   }
   std::string csv = "x_mm,y_mm,z_mm,radius_mm,along_mm,confidence\n";
   for (const TubeStation& s : tube.stations) {
-    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 0.001)) + ",";
-    csv += format_number(rounded(s.confidence, 0.01)) + "\n";
+    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 1000)) + ",";
+    csv += format_number(rounded(s.confidence, 100)) + "\n";
   }
   return {with_colours(draw_tube(tube, ct.frame, p.name, onto)), Document{csv}};
 }
@@ -114,12 +115,12 @@ std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data
     const std::string name(EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)]);
     j["structures"].push_back({{"name", name},
                                {"found", f.found},
-                               {"quality", rounded(f.quality, 0.01)},
+                               {"quality", rounded(f.quality, 100)},
                                {"why", f.why},
-                               {"volume_mm3", rounded(f.volume_mm3, 0.1)}});
+                               {"volume_mm3", rounded(f.volume_mm3, 10)}});
     if (f.found) {
-      context.report(name + "_quality", rounded(f.quality, 0.01));
-      context.report(name + "_mm3", rounded(f.volume_mm3, 0.1));
+      context.report(name + "_quality", rounded(f.quality, 100));
+      context.report(name + "_mm3", rounded(f.volume_mm3, 10));
       if (!f.why.empty()) context.warn(name + ": " + f.why);
     } else {
       context.report(name, "not found: " + f.why);
