@@ -78,7 +78,8 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
     my = (by * cxx - bx * cxy) / det;
     r = std::sqrt(std::max(0.0, (sz - 2 * mx * sx - 2 * my * sy) / s + mx * mx + my * my));
     // An arc that is too flat or too narrow says nothing of a vessel's size.
-    const double kept = std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0), std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
+    const double kept =
+        std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0), std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
     if (kept != r) {
       // The middle moves along the normal of the arc's middle, so that the wall stays where it is.
       const double ax = sx / s - mx, ay = sy / s - my, l = std::hypot(ax, ay);
@@ -287,7 +288,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     // Sizes go along to where the stations are now.
     radius.assign(next.size(), 0.0);
     for (std::size_t i = 0; i < next.size(); ++i) {
-      const double at = next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) / static_cast<double>(next.size() - 1) : 0;
+      const double at =
+          next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) / static_cast<double>(next.size() - 1) : 0;
       radius[i] = sizes[static_cast<std::size_t>(std::lround(at))];
     }
     line = next;
