@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -22,6 +22,8 @@ _osteo() {
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
+    "tube --kind") COMPREPLY=($(compgen -W "nerve vessel " -- "$cur")); return ;;
+    "find-structures --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
@@ -57,6 +59,8 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
+    tube) flags="$flags --xml --describe --points-mm --name --kind --max-radius-mm --content-hu --snap-mm --max-unsure-mm --points --labels --line-out" ;;
+    find-structures) flags="$flags --xml --describe --side --what --labyrinth-mm --least-quality --findings-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
