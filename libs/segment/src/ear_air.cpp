@@ -10,6 +10,7 @@
 namespace osteo::segment {
 namespace {
 
+constexpr double kLeastBony = 0.5;
 constexpr double kOutsideBallMm = 8;                     // wider than the canal, narrower than what is outside
 constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
 constexpr double kCavityMm3 = 60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
@@ -227,6 +228,10 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     c.why = "the air that goes inward is too short for a canal";
   } else if (c.length_mm > 50 || volume > 6000) {
     c.why = "the air that goes inward is no canal: no drum ends it";
+  } else if (c.quality < kLeastBony) {
+    // A fold, the mouth or the nose: what would be placed by it would be wrong.
+    c.why = "the air that goes inward has bone behind only " + std::to_string(static_cast<int>(std::lround(100 * c.quality))) +
+            " % of its wall";
   } else {
     c.found = true;
     if (!drum) c.why = "no air behind its end: the middle ear is not seen apart from it";
