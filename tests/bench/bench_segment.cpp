@@ -31,7 +31,8 @@ double cpu() {
 }
 
 void tubes() {
-  std::printf("| tube | diameter mm | CT | mean mm | worst mm | radius mean mm | confidence | CPU s |\n|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| tube | diameter mm | CT | mean mm | worst mm | radius mean mm | confidence | CPU s |\n|---|---|---|---|---|---|---|---|\n");
   const char* const names[] = {"straight", "helix", "genu"};
   for (int shape = 0; shape < 3; ++shape) {
     for (const double d : {0.6, 1.0, 1.5, 2.0, 3.0}) {
@@ -76,7 +77,9 @@ Line part_of(std::span<const TubePoint> t, double from, double to) {
 }
 
 void nerves(int first, int last, double spacing, double slice, double noise) {
-  std::printf("| individual | nerve | mm | mean mm | worst mm | radius mm | true | confidence | unsure | CPU s |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| individual | nerve | mm | mean mm | worst mm | radius mm | true | confidence | unsure | CPU s "
+      "|\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (int who = first; who <= last; ++who) {
     const HeadAnatomy head(static_cast<std::uint64_t>(who));
     for (const PhantomRegion region : {PhantomRegion::temporal, PhantomRegion::mandible}) {
@@ -107,7 +110,8 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
       }
       for (const Task& t : tasks) {
         std::vector<Vec3> clicks;
-        for (const double c : t.clicks) clicks.push_back(t.line.points[static_cast<std::size_t>(c * static_cast<double>(t.line.points.size() - 1))]);
+        for (const double c : t.clicks)
+          clicks.push_back(t.line.points[static_cast<std::size_t>(c * static_cast<double>(t.line.points.size() - 1))]);
         const double c0 = cpu();
         try {
           TubeParams tp;
@@ -120,8 +124,8 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
             std::snprintf(text, sizeof text, "%.1f-%.1f ", u[0], u[1]);
             unsure += text;
           }
-          std::printf("| %d | %s | %.1f | %.3f | %.2f | %.2f | %.2f | %.2f | %s | %.1f |\n", who, t.name, tube.length_mm, e.mean_mm, e.worst_mm,
-                      tube.radius_mean_mm, t.line.radius_mm, tube.confidence, unsure.c_str(), cpu() - c0);
+          std::printf("| %d | %s | %.1f | %.3f | %.2f | %.2f | %.2f | %.2f | %s | %.1f |\n", who, t.name, tube.length_mm, e.mean_mm,
+                      e.worst_mm, tube.radius_mean_mm, t.line.radius_mm, tube.confidence, unsure.c_str(), cpu() - c0);
         } catch (const Error& e) {
           std::printf("| %d | %s | %s |\n", who, t.name, e.what());
         }
@@ -132,7 +136,9 @@ void nerves(int first, int last, double spacing, double slice, double noise) {
 }
 
 void ears(int first, int last, double spacing, double slice, double noise, double scale) {
-  std::printf("| individual | structure | Dice | surface distance, mean mm | 95 %% mm | quality | mm3 | true mm3 |\n|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| individual | structure | Dice | surface distance, mean mm | 95 %% mm | quality | mm3 | true mm3 "
+      "|\n|---|---|---|---|---|---|---|---|\n");
   struct Sum {
     double dice = 0, worst = 1, mean = 0, p95 = 0, worst95 = 0;
     int n = 0, missing = 0;
@@ -165,20 +171,23 @@ void ears(int first, int last, double spacing, double slice, double noise, doubl
       }
       const std::vector<std::uint8_t> truth = ear_truth(phantom.labels, head, f.what);
       const Overlap o = overlap(found.labels, static_cast<std::uint8_t>(1 + static_cast<int>(f.what)), truth);
-      std::printf("| %d | %s | %.3f | %.2f | %.2f | %.2f | %.0f | %.0f | %s\n", who, name, o.dice, o.mean_mm, o.p95_mm, f.quality, f.volume_mm3, o.true_mm3, f.why.c_str());
+      std::printf("| %d | %s | %.3f | %.2f | %.2f | %.2f | %.0f | %.0f | %s\n", who, name, o.dice, o.mean_mm, o.p95_mm, f.quality,
+                  f.volume_mm3, o.true_mm3, f.why.c_str());
       std::fflush(stdout);
       sum.dice += o.dice, sum.mean += o.mean_mm, sum.p95 += o.p95_mm, ++sum.n;
       sum.worst = std::min(sum.worst, o.dice);
       sum.worst95 = std::max(sum.worst95, o.p95_mm);
     }
   }
-  std::printf("\n| structure | Dice mean | least | surface distance mean mm | 95 %%, mean mm | 95 %%, worst mm | not found |\n|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n| structure | Dice mean | least | surface distance mean mm | 95 %%, mean mm | 95 %%, worst mm | not found "
+      "|\n|---|---|---|---|---|---|---|\n");
   for (int s = 0; s < kEarStructures; ++s) {
     const Sum& m = sums[static_cast<std::size_t>(s)];
     if (m.n + m.missing == 0) continue;
     const double n = std::max(1, m.n);
-    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.2f | %d |\n", EnumNames<EarStructure>::values[static_cast<std::size_t>(s)].data(), m.dice / n,
-                m.worst, m.mean / n, m.p95 / n, m.worst95, m.missing);
+    std::printf("| %s | %.3f | %.3f | %.2f | %.2f | %.2f | %d |\n", EnumNames<EarStructure>::values[static_cast<std::size_t>(s)].data(),
+                m.dice / n, m.worst, m.mean / n, m.p95 / n, m.worst95, m.missing);
   }
   std::printf("CPU %.1f s an ear\n", seconds / (last - first + 1));
 }
@@ -196,7 +205,8 @@ int main(int argc, char** argv) {
   } else if (what == "ears") {
     ears(static_cast<int>(arg(2, 6)), static_cast<int>(arg(3, 15)), arg(4, 0.5), arg(5, 0), arg(6, 30), arg(7, 1));
   } else {
-    std::fprintf(stderr, "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING SLICE NOISE]\n");
+    std::fprintf(stderr,
+                 "osteo_bench_segment ears [FIRST LAST SPACING SLICE NOISE SCALE] | tubes | nerves [FIRST LAST SPACING SLICE NOISE]\n");
     return 2;
   }
   rusage u{};

@@ -15,8 +15,8 @@ namespace {
 
 using namespace segment;
 
-constexpr std::array<std::string_view, kEarStructures> kTitles{"external ear canal", "air cells and middle ear", "sigmoid sinus", "tegmen",
-                                                               "dura", "labyrinth"};
+constexpr std::array<std::string_view, kEarStructures> kTitles{
+    "external ear canal", "air cells and middle ear", "sigmoid sinus", "tegmen", "dura", "labyrinth"};
 constexpr std::array<std::array<std::uint8_t, 3>, kEarStructures> kColours{
     {{111, 184, 210}, {150, 200, 230}, {60, 110, 210}, {230, 150, 90}, {220, 130, 170}, {128, 174, 128}}};
 
@@ -38,7 +38,8 @@ std::vector<EarStructure> parse_what(const std::string& what) {
       const std::string near = nearest_name(word, known);
       std::string all;
       for (const std::string& k : known) all += (all.empty() ? "" : ", ") + k;
-      throw Error(ExitCode::usage, "--what: there is no finder for '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"), all);
+      throw Error(ExitCode::usage, "--what: there is no finder for '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"),
+                  all);
     }
     asked[static_cast<std::size_t>(it - names.begin())] = true;
   }
@@ -101,10 +102,9 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
     std::array<double, kEarStructures> volume{};
     if (f != nullptr) {
       // Of two that claim a voxel the last of this order has it.
-      constexpr std::array<EarStructure, kEarStructures> kOrder{EarStructure::dura,      EarStructure::tegmen,    EarStructure::air_cells,
-                                                                EarStructure::ear_canal, EarStructure::labyrinth, EarStructure::sigmoid_sinus};
-      Mat3 to_index = inverse(Mat3{});
-      (void)to_index;
+      constexpr std::array<EarStructure, kEarStructures> kOrder{EarStructure::dura,      EarStructure::tegmen,
+                                                                EarStructure::air_cells, EarStructure::ear_canal,
+                                                                EarStructure::labyrinth, EarStructure::sigmoid_sinus};
       for (const EarStructure s : kOrder) {
         const Part& part = parts[static_cast<std::size_t>(s)];
         if (!wants(s) || !part.found || part.quality < params.least_quality) continue;
@@ -130,7 +130,8 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
       const auto at = static_cast<std::size_t>(s);
       const Part& part = parts[at];
       EarFinding finding{s, part.found && part.quality >= params.least_quality, part.quality, part.why, volume[at]};
-      if (part.found && !finding.found) finding.why = "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --least-quality; " + part.why;
+      if (part.found && !finding.found)
+        finding.why = "quality " + format_number(std::round(part.quality * 100) / 100) + " is below --least-quality; " + part.why;
       if (finding.found) result.labels.structures.push_back({static_cast<std::uint8_t>(1 + at), std::string(kTitles[at]), kColours[at]});
       result.findings.push_back(finding);
     }
@@ -210,8 +211,8 @@ EarFindings find_ear_structures(const Image& given, const EarParams& params, con
   if (wants(EarStructure::air_cells) || wants(EarStructure::tegmen)) air = find_air_cells(f, levels, canal, context.sub(0.4, 0.5));
   if (wants(EarStructure::sigmoid_sinus) || wants(EarStructure::tegmen) || wants(EarStructure::dura)) {
     const Brain brain = find_brain(f, levels, canal, context.sub(0.5, 0.6));
-    Part &sinus = parts[static_cast<std::size_t>(EarStructure::sigmoid_sinus)], &tegmen = parts[static_cast<std::size_t>(EarStructure::tegmen)],
-         &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
+    Part &sinus = parts[static_cast<std::size_t>(EarStructure::sigmoid_sinus)],
+         &tegmen = parts[static_cast<std::size_t>(EarStructure::tegmen)], &dura = parts[static_cast<std::size_t>(EarStructure::dura)];
     sinus.why = tegmen.why = dura.why = brain.why;
     if (brain.found) {
       sinus = find_sinus(f, levels, canal, context.sub(0.6, 0.9));

@@ -10,12 +10,13 @@
 namespace osteo::segment {
 namespace {
 
-constexpr double kOutsideBallMm = 8;  // wider than the canal, narrower than what is outside
+constexpr double kLeastBony = 0.5;
+constexpr double kOutsideBallMm = 8;                     // wider than the canal, narrower than what is outside
 constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
-constexpr double kCavityMm3 = 150;    // the middle ear has more; behind wax or a bend there is less
+constexpr double kCavityMm3 = 60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
 
-/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they widen it opens into a
-/// fold of the skin; from there on only what lies straight on is kept.
+/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they widen it opens into
+/// a fold of the skin; from there on only what lies straight on is kept.
 void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside) {
   const std::size_t n = f.size();
   float deepest = 0;
@@ -149,8 +150,8 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     if (pieces.of[i] == best && static_cast<double>(to_outside[i]) < 1.5 * f.h_mm) seeds.push_back(i);
   }
   const std::vector<float> up = climbed(f, height, seeds, [&](std::size_t i) { return pieces.of[i] == best; });
-  const Pass pass = greatest_pass(f, height, up, std::max(25.0, 1.0 * levels.noise_hu));
-  const bool drum = pass.volume_mm3 > kCavityMm3;
+  const Pass pass = lowest_pass(f, height, up, std::max(25.0, 1.0 * levels.noise_hu), kCavityMm3);
+  const bool drum = pass.volume_mm3 > 0;
   // Voxels at the walls are as high as a pass: they go with the nearest that are not.
   Mask before(n), behind(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -227,6 +228,10 @@ Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
     c.why = "the air that goes inward is too short for a canal";
   } else if (c.length_mm > 50 || volume > 6000) {
     c.why = "the air that goes inward is no canal: no drum ends it";
+  } else if (c.quality < kLeastBony) {
+    // A fold, the mouth or the nose: what would be placed by it would be wrong.
+    c.why = "the air that goes inward has bone behind only " + std::to_string(static_cast<int>(std::lround(100 * c.quality))) +
+            " % of its wall";
   } else {
     c.found = true;
     if (!drum) c.why = "no air behind its end: the middle ear is not seen apart from it";
@@ -332,7 +337,8 @@ Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const C
   }
   const auto flood = [&](double level, const std::vector<std::uint8_t>* barred) {
     return climbed(f, f.v, {seed}, [&](std::size_t i) {
-      if (static_cast<double>(f.v[i]) > level || static_cast<double>(to_air[i]) <= 1.6 * f.h_mm || (barred != nullptr && (*barred)[i] != 0)) return false;
+      if (static_cast<double>(f.v[i]) > level || static_cast<double>(to_air[i]) <= 1.6 * f.h_mm || (barred != nullptr && (*barred)[i] != 0))
+        return false;
       const auto p = f.place(i);
       return length(f.world(p[0], p[1], p[2]) - point_mm) < kReachMm;
     });

@@ -88,17 +88,29 @@ std::vector<float> climbed(const Field& f, const std::vector<float>& height, con
   return best;
 }
 
-Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop) {
-  std::map<float, std::size_t> behind;
+namespace {
+std::map<float, double> volumes_behind(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed,
+                                       double least_drop) {
+  std::map<float, double> behind;
   for (std::size_t i = 0; i < f.size(); ++i) {
-    if (climbed[i] < std::numeric_limits<float>::infinity() && static_cast<double>(climbed[i] - height[i]) > least_drop) ++behind[climbed[i]];
+    if (climbed[i] < std::numeric_limits<float>::infinity() && static_cast<double>(climbed[i] - height[i]) > least_drop)
+      behind[climbed[i]] += f.h_mm * f.h_mm * f.h_mm;
   }
+  return behind;
+}
+}  // namespace
+
+Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop) {
   Pass pass;
-  for (const auto& [h, n] : behind) {
-    const double volume = static_cast<double>(n) * f.h_mm * f.h_mm * f.h_mm;
+  for (const auto& [h, volume] : volumes_behind(f, height, climbed, least_drop))
     if (volume > pass.volume_mm3) pass = {static_cast<double>(h), volume};
-  }
   return pass;
+}
+
+Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop, double least_mm3) {
+  for (const auto& [h, volume] : volumes_behind(f, height, climbed, least_drop))
+    if (volume >= least_mm3) return {static_cast<double>(h), volume};
+  return {};
 }
 
 }  // namespace osteo::segment

@@ -15,9 +15,9 @@ namespace osteo::segment {
 /// Values that tell air, soft tissue and bone apart in this scan.
 struct Levels {
   double soft_hu = 40, bone_hu = 1000, noise_hu = 0;
-  double bone_above = 500;   ///< half way from soft tissue to bone
-  double air_below = -480;   ///< half way from air to soft tissue
-  double cell_below = -20;   ///< half way from air to bone
+  double bone_above = 500;  ///< half way from soft tissue to bone
+  double air_below = -480;  ///< half way from air to soft tissue
+  double cell_below = -20;  ///< half way from air to bone
 };
 
 using Mask = std::vector<std::uint8_t>;
@@ -30,8 +30,8 @@ struct Part {
 };
 
 struct Canal : Part {
-  Vec3 drum_mm;     ///< its inner end
-  Mask exterior;    ///< air outside of the head
+  Vec3 drum_mm;   ///< its inner end
+  Mask exterior;  ///< air outside of the head
   double length_mm = 0;
 };
 
@@ -64,6 +64,10 @@ struct Pass {
   double volume_mm3 = 0;
 };
 [[nodiscard]] Pass greatest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop);
+
+/// The lowest pass behind which at least so much lies.
+[[nodiscard]] Pass lowest_pass(const Field& f, const std::vector<float>& height, const std::vector<float>& climbed, double least_drop,
+                               double least_mm3);
 
 [[nodiscard]] Canal find_canal(const Field& f, const Levels& levels, const Context& context);
 [[nodiscard]] Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, const Context& context);

@@ -78,7 +78,8 @@ Round fit_round(const Field& f, const Levels& levels, Vec3 at, Vec3 along, doubl
     my = (by * cxx - bx * cxy) / det;
     r = std::sqrt(std::max(0.0, (sz - 2 * mx * sx - 2 * my * sy) / s + mx * mx + my * my));
     // An arc that is too flat or too narrow says nothing of a vessel's size.
-    const double kept = std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0), std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
+    const double kept =
+        std::clamp(r, std::max(kLeastRadiusMm, radius > 0 ? radius - 0.7 : 0), std::min(kMostRadiusMm, radius > 0 ? radius + 0.7 : 10));
     if (kept != r) {
       // The middle moves along the normal of the arc's middle, so that the wall stays where it is.
       const double ax = sx / s - mx, ay = sy / s - my, l = std::hypot(ax, ay);
@@ -182,7 +183,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (value > start_value) start_value = value, start = i;
   }
   // Below the lowest place of the groove the vein leaves the skull, and muscles between bones look like grooves too.
-  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 3;
+  const double lowest = g.origin_mm.z + least_z[best] * g.h_mm - 2;
   constexpr float kFar = std::numeric_limits<float>::max();
   std::vector<float> reached(g.size(), kFar);
   std::vector<float> way_mm(g.size(), 0.0F);
@@ -207,7 +208,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
           const std::size_t to = g.at(p[0] + i, p[1] + j, p[2] + k);
           if (g.v[to] < 0.52F || static_cast<double>(wide[to]) < kLeastRadiusMm || g.world(0, 0, p[2] + k).z < lowest) continue;
           const double step = std::sqrt(static_cast<double>(i * i + j * j + k * k));
-          const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.05 + worth(to)));
+          const auto cost = static_cast<float>(static_cast<double>(c) + step / (0.03 + worth(to) * worth(to)));
           if (cost < reached[to]) {
             reached[to] = cost;
             way_mm[to] = way_mm[at] + static_cast<float>(step);
@@ -233,7 +234,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     if (reached[i] == kFar) continue;
     const auto p = g.place(i);
     const Vec3 x = g.world(p[0], p[1], p[2]);
-    if (x.z < lowest || worth(i) < 0.35) continue;
+    if (x.z < lowest || worth(i) < 0.35 || g.v[i] < 0.58F) continue;
     // Upwards it goes backwards too; downwards inward and forward.
     if (x.z > middle.z + 2 && x.y > middle.y - 3 && way_mm[i] > way_mm[up]) up = i;
     if (x.z < middle.z + 4 && x.x < middle.x && x.y < middle.y + 4 && way_mm[i] > way_mm[down]) down = i;
@@ -287,7 +288,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
     // Sizes go along to where the stations are now.
     radius.assign(next.size(), 0.0);
     for (std::size_t i = 0; i < next.size(); ++i) {
-      const double at = next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) / static_cast<double>(next.size() - 1) : 0;
+      const double at =
+          next.size() > 1 ? static_cast<double>(i) * static_cast<double>(line.size() - 1) / static_cast<double>(next.size() - 1) : 0;
       radius[i] = sizes[static_cast<std::size_t>(std::lround(at))];
     }
     line = next;

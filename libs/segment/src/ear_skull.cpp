@@ -8,9 +8,9 @@
 namespace osteo::segment {
 namespace {
 
-constexpr double kBrainBallMm = 7;   // wider than the sinus, the canals of nerves and the muscles between bone
-constexpr double kDuraMm = 2;        // labelled on the brain's side
-constexpr double kPlateMm = 4;       // of the tegmen, where no air ends it before
+constexpr double kBrainBallMm = 7;  // wider than the sinus, the canals of nerves and the muscles between bone
+constexpr double kDuraMm = 2;       // labelled on the brain's side
+constexpr double kPlateMm = 4;      // of the tegmen, where no air ends it before
 
 /// Closing of a mask in the plane by a disc.
 Mask closed2(const Mask& m, int nx, int ny, double radius) {
@@ -139,11 +139,13 @@ Part find_tegmen(const Field& f, const Levels& levels, const Canal& canal, const
     const double bottom = p.air_below ? p.bottom : std::max(p.bottom, p.top - kPlateMm / f.h_mm);
     const double low = !p.air_below && p.bottom >= p.top ? p.top - kPlateMm / f.h_mm : bottom;
     const int i = static_cast<int>(c) % nx, j = static_cast<int>(c) / nx;
-    for (int k = std::max(0, static_cast<int>(std::ceil(low))); k <= std::min(nz - 1, static_cast<int>(std::floor(p.top))); ++k) part.mask[f.at(i, j, k)] = 1;
+    for (int k = std::max(0, static_cast<int>(std::ceil(low))); k <= std::min(nz - 1, static_cast<int>(std::floor(p.top))); ++k)
+      part.mask[f.at(i, j, k)] = 1;
   }
   part.quality = seen / static_cast<double>(most);
   part.found = true;
-  if (part.quality < 0.9) part.why = "thinner than can be seen in " + std::to_string(static_cast<int>(std::lround(100 * (1 - part.quality)))) + " % of it";
+  if (part.quality < 0.9)
+    part.why = "thinner than can be seen in " + std::to_string(static_cast<int>(std::lround(100 * (1 - part.quality)))) + " % of it";
   return part;
 }
 
@@ -161,12 +163,16 @@ Part find_dura(const Field& f, const Levels& levels, const Canal& canal, const B
   const std::vector<float> to_other = distance_mm(f, other, context), to_brain = distance_mm(f, brain.mask, context);
   Mask core(n);
   for (std::size_t i = 0; i < n; ++i) {
-    core[i] = brain.mask[i] != 0 || (static_cast<double>(to_other[i]) > kBallMm && static_cast<double>(to_brain[i]) < 3 && sinus[i] == 0) ? 1 : 0;
+    core[i] =
+        brain.mask[i] != 0 || (static_cast<double>(to_other[i]) > kBallMm && static_cast<double>(to_brain[i]) < 3 && sinus[i] == 0) ? 1 : 0;
   }
   const std::vector<float> to_core = distance_mm(f, core, context);
   Mask inner(n), bone(n);
   for (std::size_t i = 0; i < n; ++i) {
-    inner[i] = brain.mask[i] != 0 || (soft[i] != 0 && sinus[i] == 0 && static_cast<double>(to_core[i]) < kBallMm && static_cast<double>(to_brain[i]) < 4) ? 1 : 0;
+    inner[i] = brain.mask[i] != 0 ||
+                       (soft[i] != 0 && sinus[i] == 0 && static_cast<double>(to_core[i]) < kBallMm && static_cast<double>(to_brain[i]) < 4)
+                   ? 1
+                   : 0;
     bone[i] = static_cast<double>(f.v[i]) >= levels.bone_above ? 1 : 0;
   }
   // What is only near, as the blurred edge of a cell across a thin plate, is no part of it.

@@ -37,8 +37,8 @@ void bounds_of(const Frame& frame, Vec3& lo_mm, Vec3& hi_mm) {
   lo_mm = {1e30, 1e30, 1e30};
   hi_mm = {-1e30, -1e30, -1e30};
   for (int c = 0; c < 8; ++c) {
-    const Vec3 p = frame.world_from_index({(c & 1) != 0 ? frame.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? frame.dims[1] - 1.0 : 0.0,
-                                           (c & 4) != 0 ? frame.dims[2] - 1.0 : 0.0});
+    const Vec3 p = frame.world_from_index(
+        {(c & 1) != 0 ? frame.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? frame.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? frame.dims[2] - 1.0 : 0.0});
     for (std::size_t a = 0; a < 3; ++a) {
       lo_mm[a] = std::min(lo_mm[a], p[a]);
       hi_mm[a] = std::max(hi_mm[a], p[a]);
@@ -102,7 +102,8 @@ std::vector<float> smoothed(const std::vector<float>& v, std::array<int, 3> n, d
   std::vector<float> w(static_cast<std::size_t>(2 * reach + 1));
   double sum = 0;
   for (int i = -reach; i <= reach; ++i) sum += std::exp(-0.5 * i * i / (sigma * sigma));
-  for (int i = -reach; i <= reach; ++i) w[static_cast<std::size_t>(i + reach)] = static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) / sum);
+  for (int i = -reach; i <= reach; ++i)
+    w[static_cast<std::size_t>(i + reach)] = static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) / sum);
   const auto nx = static_cast<std::size_t>(n[0]), ny = static_cast<std::size_t>(n[1]), nz = static_cast<std::size_t>(n[2]);
   std::vector<float> a(v.size()), b(v.size());
   // Along x a row at a time; along y and z whole rows are added up, so that memory is read in order.

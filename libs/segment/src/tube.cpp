@@ -17,10 +17,10 @@ using segment::evenly;
 using segment::Sampler;
 using segment::smoothed_line;
 
-constexpr double kStepMm = 0.25;    // between stations
-constexpr int kRays = 24;           // across
+constexpr double kStepMm = 0.25;  // between stations
+constexpr int kRays = 24;         // across
 constexpr double kRayStepMm = 0.1;
-constexpr double kSmoothMm = 0.4;   // along, standard deviation
+constexpr double kSmoothMm = 0.4;  // along, standard deviation
 constexpr int kRounds = 5;
 constexpr double kLeastWallHu = 150;  // a wall stands out by this much, and by four times the noise
 
@@ -71,7 +71,7 @@ Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const Tu
   std::nth_element(around.begin(), around.begin() + kRays / 2, around.end());
   const bool nerve = params.kind == TubeKind::nerve;
   const bool in_air = nerve && around[kRays / 2] < -500 && middle < 0;
-  const double sign = nerve && !in_air ? 1 : -1;  // which way the wall differs from the content
+  const double sign = nerve && !in_air ? 1 : -1;             // which way the wall differs from the content
   if (nerve && !in_air && middle < -350) return {at, 0, 0};  // an air cell
   // The wall of each ray: where the value is farthest from the middle's before it comes back by half.
   const double least = std::max(kLeastWallHu, 4 * noise);
@@ -179,7 +179,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     const Vec3 p = points_mm[i], x = ct.frame.index_from_world(p);
     for (std::size_t a = 0; a < 3; ++a) {
       if (!(x[a] >= -0.5 && x[a] <= last[a])) {
-        throw Error(ExitCode::usage, "point " + std::to_string(i + 1) + " lies outside the CT", "'osteo info' shows where the CT lies (LPS mm)");
+        throw Error(ExitCode::usage, "point " + std::to_string(i + 1) + " lies outside the CT",
+                    "'osteo info' shows where the CT lies (LPS mm)");
       }
       lo[a] = std::min(lo[a], p[a]);
       hi[a] = std::max(hi[a], p[a]);
@@ -192,8 +193,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
   const double h = std::clamp(0.8 * std::min({s.x, s.y, s.z}), 0.3, 0.6);
   const segment::Field field = segment::make_field(ct, lo - rim, hi + rim, h, context.threads);
   const std::vector<float> like = segment::tubeness(field, params, context.sub(0, 0.5));
-  const std::vector<Vec3> way = segment::cheapest_way(field, like, points_mm,
-                                                       std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
+  const std::vector<Vec3> way =
+      segment::cheapest_way(field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
 
   const double noise = segment::noise_of(ct);
   const Sampler hu(ct);
@@ -276,8 +277,8 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
                                       [](const auto& a, const auto& b) { return a[1] - a[0] < b[1] - b[0]; });
     const auto mm = [](double x) { return format_number(std::round(x * 10) / 10); };
     throw Error(ExitCode::failed,
-                "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) + " mm of " + mm(tube.length_mm) +
-                    " mm along the way",
+                "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) + " mm of " +
+                    mm(tube.length_mm) + " mm along the way",
                 "give a point on it there, check --kind, or allow it with --max-unsure-mm");
   }
   tube.radius_mean_mm /= sure;

@@ -160,7 +160,8 @@ std::vector<Vec3> cheapest_way(const Field& f, const std::vector<float>& tubenes
         if (!f.inside(p[0] + d.i, p[1] + d.j, p[2] + d.k)) continue;
         const std::size_t to = f.at(p[0] + d.i, p[1] + d.j, p[2] + d.k);
         if (closed[to]) continue;
-        const auto c = static_cast<float>(static_cast<double>(reached[at]) + 0.5 * d.length * (own + cost(to)) * detour(p[0] + d.i, p[1] + d.j, p[2] + d.k));
+        const auto c = static_cast<float>(static_cast<double>(reached[at]) +
+                                          0.5 * d.length * (own + cost(to)) * detour(p[0] + d.i, p[1] + d.j, p[2] + d.k));
         if (c < reached[to]) {
           reached[to] = c;
           from[to] = static_cast<std::int8_t>(s);

@@ -12,8 +12,9 @@
 namespace osteo {
 namespace {
 
-double rounded(double x, double to) {
-  return std::round(x / to) * to;
+/// To so many decimals; as text it has no more.
+double rounded(double x, double decimals) {
+  return std::round(x * decimals) / decimals;
 }
 
 std::vector<Vec3> parse_points(const std::string& text) {
@@ -42,21 +43,22 @@ Labels with_colours(const Labels& labels) {
 }  // namespace
 
 StageInfo TubeStage::info() {
-  return {.name = "tube",
-          .version = 1,
-          .synopsis = "a nerve or vessel from a few points on it: centre line, radius, mask",
-          .description =
-              "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the walls across it, "
-              "measures its radius, and draws it into a label map. Says where no walls are seen: there the line is a smooth curve through "
-              "the points. Points that no tube joins are refused. docs/structures.md has how far off it is.",
-          .inputs = {{"image", {DataKind::image}, "CT in HU"},
-                     {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
-                     {"labels", {DataKind::labels}, "label map of this CT to which it is added", true}},
-          .outputs = {{"structures", {DataKind::labels}, "label map with the tube"},
-                      {"line", {DataKind::document}, "centre line as text (.csv): x, y, z, radius, way and confidence of each point", true}},
-          .references = {"Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image Anal. 1998",
-                         "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. Med. Biol. 1999"},
-          .example = "osteo tube ct.nrrd nerve.seg.nrrd --points-mm '36,-2,-12; 42,7,-18; 46,8,-38' --line-out nerve.csv"};
+  return {
+      .name = "tube",
+      .version = 1,
+      .synopsis = "a nerve or vessel from a few points on it: centre line, radius, mask",
+      .description =
+          "Finds the cheapest way between the points through what looks like a tube, moves it to the middle of the walls across it, "
+          "measures its radius, and draws it into a label map. Says where no walls are seen: there the line is a smooth curve through "
+          "the points. Points that no tube joins are refused. docs/structures.md has how far off it is.",
+      .inputs = {{"image", {DataKind::image}, "CT in HU"},
+                 {"points", {DataKind::source}, "text file, a point x, y, z (LPS mm) a line; in place of --points-mm", true},
+                 {"labels", {DataKind::labels}, "label map of this CT to which it is added", true}},
+      .outputs = {{"structures", {DataKind::labels}, "label map with the tube"},
+                  {"line", {DataKind::document}, "centre line as text (.csv): x, y, z, radius, way and confidence of each point", true}},
+      .references = {"Y. Sato et al., Three-dimensional multi-scale line filter, Med. Image Anal. 1998",
+                     "S. Prevrhal et al., Accuracy limits for the determination of cortical width and density, Phys. Med. Biol. 1999"},
+      .example = "osteo tube ct.nrrd nerve.seg.nrrd --points-mm '36,-2,-12; 42,7,-18; 46,8,-38' --line-out nerve.csv"};
 }
 
 std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
@@ -64,17 +66,18 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   const auto* const file = std::get_if<Source>(&inputs[1]);
   const auto* const onto = std::get_if<Labels>(&inputs[2]);
   if (p.name.empty()) throw Error(ExitCode::usage, "--name is empty");
-  if ((file != nullptr) == !p.points_mm.empty()) throw Error(ExitCode::usage, "give the tube's points by --points-mm or by --points FILE, not both");
+  if ((file != nullptr) == !p.points_mm.empty())
+    throw Error(ExitCode::usage, "give the tube's points by --points-mm or by --points FILE, not both");
   const std::vector<Vec3> points = file != nullptr ? load_points(file->path) : parse_points(p.points_mm);
   const Tube tube = trace_tube(ct, points, p.tube, context);
-  context.report("length_mm", rounded(tube.length_mm, 0.1));
-  context.report("radius_mean_mm", rounded(tube.radius_mean_mm, 0.01));
-  context.report("radius_min_mm", rounded(tube.radius_min_mm, 0.01));
-  context.report("radius_max_mm", rounded(tube.radius_max_mm, 0.01));
-  context.report("confidence", rounded(tube.confidence, 0.01));
+  context.report("length_mm", rounded(tube.length_mm, 10));
+  context.report("radius_mean_mm", rounded(tube.radius_mean_mm, 100));
+  context.report("radius_min_mm", rounded(tube.radius_min_mm, 100));
+  context.report("radius_max_mm", rounded(tube.radius_max_mm, 100));
+  context.report("confidence", rounded(tube.confidence, 100));
   std::string unsure;
   for (const auto& u : tube.unsure_mm) {
-    unsure += (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 0.1)) + " to " + format_number(rounded(u[1], 0.1));
+    unsure += (unsure.empty() ? "" : ", ") + format_number(rounded(u[0], 10)) + " to " + format_number(rounded(u[1], 10));
   }
   if (!unsure.empty()) {
     context.report("unsure_mm", unsure);
@@ -82,8 +85,8 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
   }
   std::string csv = "x_mm,y_mm,z_mm,radius_mm,along_mm,confidence\n";
   for (const TubeStation& s : tube.stations) {
-    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 0.001)) + ",";
-    csv += format_number(rounded(s.confidence, 0.01)) + "\n";
+    for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 1000)) + ",";
+    csv += format_number(rounded(s.confidence, 100)) + "\n";
   }
   return {with_colours(draw_tube(tube, ct.frame, p.name, onto)), Document{csv}};
 }
@@ -93,9 +96,12 @@ StageInfo FindStructuresStage::info() {
           .version = 1,
           .synopsis = "ear canal, air cells, sigmoid sinus, tegmen, dura, labyrinth found in a CT",
           .description =
-              "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the air outside, the air behind "
-              "the drum, the round vessel in the groove of the sigmoid sinus, the plate of bone under the middle fossa, 2 mm of brain's side on "
-              "the skull's inner surface, and, from a point in it, the fluid of the labyrinth. Each has a quality from 0 to 1 or a reason why it "
+              "Looks for structures of one ear by what bone, air and soft tissue bound: the external canal from the air outside, the air "
+              "behind "
+              "the drum, the round vessel in the groove of the sigmoid sinus, the plate of bone under the middle fossa, 2 mm of brain's "
+              "side on "
+              "the skull's inner surface, and, from a point in it, the fluid of the labyrinth. Each has a quality from 0 to 1 or a reason "
+              "why it "
               "was not found. A proposal to be looked at: docs/structures.md says how far off it is and what it does not know.",
           .inputs = {{"image", {DataKind::image}, "CT in HU, of a head or around an ear"}},
           .outputs = {{"structures", {DataKind::labels}, "label map with names and colours of what was found"},
@@ -114,12 +120,12 @@ std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data
     const std::string name(EnumNames<EarStructure>::values[static_cast<std::size_t>(f.what)]);
     j["structures"].push_back({{"name", name},
                                {"found", f.found},
-                               {"quality", rounded(f.quality, 0.01)},
+                               {"quality", rounded(f.quality, 100)},
                                {"why", f.why},
-                               {"volume_mm3", rounded(f.volume_mm3, 0.1)}});
+                               {"volume_mm3", rounded(f.volume_mm3, 10)}});
     if (f.found) {
-      context.report(name + "_quality", rounded(f.quality, 0.01));
-      context.report(name + "_mm3", rounded(f.volume_mm3, 0.1));
+      context.report(name + "_quality", rounded(f.quality, 100));
+      context.report(name + "_mm3", rounded(f.volume_mm3, 10));
       if (!f.why.empty()) context.warn(name + ": " + f.why);
     } else {
       context.report(name, "not found: " + f.why);
@@ -129,9 +135,11 @@ std::vector<Data> FindStructuresStage::run(const Params& p, std::span<const Data
   }
   Document document{j.dump(1) + "\n"};
   if (found.labels.structures.empty()) {
-    throw ErrorWithDocument(Error(ExitCode::failed, "nothing was found on the " + std::string(EnumNames<Side>::values[static_cast<std::size_t>(p.side)]) + ": " + missing,
-                                  "is it the right side, and is the ear within the image with air outside of it?"),
-                            "findings", document);
+    throw ErrorWithDocument(
+        Error(ExitCode::failed,
+              "nothing was found on the " + std::string(EnumNames<Side>::values[static_cast<std::size_t>(p.side)]) + ": " + missing,
+              "is it the right side, and is the ear within the image with air outside of it?"),
+        "findings", document);
   }
   return {found.labels, document};
 }

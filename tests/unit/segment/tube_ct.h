@@ -61,7 +61,7 @@ struct TubeCt {
   Vec3 spacing_mm{0.5, 0.5, 0.5};
   double noise_hu = 30;
   bool oblique = false;
-  bool cellular = false;     ///< air cells of 1 to 2 mm radius up to 0.8 mm from the tube
+  bool cellular = false;  ///< air cells of 1 to 2 mm radius up to 0.8 mm from the tube
   double inside_hu = 50, wall_hu = 960;
 };
 

@@ -59,7 +59,7 @@ const std::map<std::string, Recipe>& table() {
       {"saw", {{{"normal", "0,0,1"}}, {}, {}}},
       {"curve", {{}, {{"curve", "0 0 0\n10 0 0\n10 10 0\n"}, {"path", "1 1 0\n9 1 0\n9 8 0\n"}}, {}}},
       {"tube", {{{"points_mm", "53.4,25.9,-15.6; 48,24,-28"}, {"max_radius_mm", "5"}, {"name", "sigmoid sinus"}}, {}, {"line"}}},
-      {"find-structures", {{{"least_quality", "0"}}, {}, {"findings"}}},
+      {"find-structures", {{{"what", "ear_canal,air_cells"}}, {}, {"findings"}}},
       {"phantom", {{{"region", "temporal"}, {"spacing_mm", "4"}}, {}, {}}},
   };
   return value;
@@ -205,6 +205,14 @@ void expect_announced(vtkOsteoStage* stage, int port) {
   EXPECT_EQ(next->GetOutput()->GetNumberOfPoints(), image->GetNumberOfPoints());
 }
 
+Image finer_ct() {
+  PhantomParams p;
+  p.region = PhantomRegion::temporal;
+  p.spacing_mm = 1;
+  p.individual = 1;
+  return image_from_vtk(to_vtk(make_phantom(p).ct));
+}
+
 class EveryStage : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
@@ -241,6 +249,7 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
       document.apply(BrushEdit{1, false, 5, {ct.frame.centre_mm()}});
       inputs.back() = Document{edits_text(recipe_of(document))};
     }
+    if (GetParam() == "find-structures") inputs.back() = finer_ct();  // an ear cannot be made out in 2 mm voxels
     vtkNew<vtkTrivialProducer> producer;
     producer->SetOutput(as_vtk(inputs.back()));
     filter->SetInputConnection(filter->GetInputPortIndex(port.name), producer->GetOutputPort());

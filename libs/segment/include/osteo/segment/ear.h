@@ -32,8 +32,8 @@ inline constexpr int kEarStructures = 6;
 struct EarParams {
   Side side = Side::left;
   std::string what = "ear_canal,air_cells,sigmoid_sinus,tegmen,dura";  ///< names of EarStructure, with commas; "all" for all
-  std::array<double, 3> labyrinth_mm{0, 0, 0};  ///< a point within the labyrinth, LPS; needed for it
-  double least_quality = 0.3;                   ///< what is below is not found
+  std::array<double, 3> labyrinth_mm{0, 0, 0};                         ///< a point within the labyrinth, LPS; needed for it
+  double least_quality = 0.3;                                          ///< what is below is not found
 };
 
 struct EarFinding {
@@ -45,7 +45,7 @@ struct EarFinding {
 };
 
 struct EarFindings {
-  Labels labels;  ///< value 1 + EarStructure; in the CT's frame; structures of what was found
+  Labels labels;                     ///< value 1 + EarStructure; in the CT's frame; structures of what was found
   std::vector<EarFinding> findings;  ///< one for each that was asked for, in the order of EarStructure
   Vec3 drum_mm;                      ///< inner end of the ear canal; meaningless when no canal was found
 };

@@ -40,8 +40,8 @@ struct TubeStation {
 struct Tube {
   std::vector<TubeStation> stations;  ///< every 0.25 mm
   double length_mm = 0, radius_mean_mm = 0, radius_min_mm = 0, radius_max_mm = 0;
-  double confidence = 0;                          ///< mean along the line
-  std::vector<std::array<double, 2>> unsure_mm;   ///< from, to along the line, where confidence is below one half
+  double confidence = 0;                         ///< mean along the line
+  std::vector<std::array<double, 2>> unsure_mm;  ///< from, to along the line, where confidence is below one half
 };
 
 /// The cheapest way through `points_mm` (LPS, two or more, in order; within the CT), where a place costs little if across some direction
