@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -40,6 +40,8 @@ _osteo() {
     import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --axes --verdict-out" ;;
     import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
+    denoise) flags="$flags --xml --describe --strength" ;;
+    reduce-metal) flags="$flags --xml --describe --metal-hu --least-mm2" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
@@ -63,7 +65,7 @@ _osteo() {
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
-    series) flags="$flags --studies" ;;
+    series) flags="$flags --studies --thumbnails" ;;
     guide) flags="$flags --series --hu-offset --picture" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
