@@ -2,13 +2,14 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
     "crop --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "threshold --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "threshold --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
+    "resample --between") COMPREPLY=($(compgen -W "automatic values outlines " -- "$cur")); return ;;
     "surface --method") COMPREPLY=($(compgen -W "nets voxel " -- "$cur")); return ;;
     "distance --region") COMPREPLY=($(compgen -W "box interior band " -- "$cur")); return ;;
     "distance --method") COMPREPLY=($(compgen -W "exact swept thesis " -- "$cur")); return ;;
@@ -22,8 +23,7 @@ _osteo() {
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
-    "tube --kind") COMPREPLY=($(compgen -W "nerve vessel " -- "$cur")); return ;;
-    "find-structures --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
+    "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
@@ -40,8 +40,10 @@ _osteo() {
     import) flags="$flags --xml --describe --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --axes --verdict-out" ;;
     import-bone) flags="$flags --xml --describe --lower --spacing-mm --min-volume-mm3 --keep-largest --series --stack --max-gap-mm --max-hole-mm --any-modality --hu-offset --hu-out --valid-out --verdict-out" ;;
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
+    denoise) flags="$flags --xml --describe --strength" ;;
+    reduce-metal) flags="$flags --xml --describe --metal-hu --least-mm2" ;;
     threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
-    resample) flags="$flags --xml --describe --spacing-mm --lower --box-mm --centre-mm --align-mm --hu-out" ;;
+    resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
     mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
@@ -59,12 +61,11 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
-    tube) flags="$flags --xml --describe --points-mm --name --kind --max-radius-mm --content-hu --snap-mm --max-unsure-mm --points --labels --line-out" ;;
-    find-structures) flags="$flags --xml --describe --side --what --labyrinth-mm --least-quality --findings-out" ;;
+    register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
     info) flags="$flags" ;;
-    series) flags="$flags --studies" ;;
+    series) flags="$flags --studies --thumbnails" ;;
     guide) flags="$flags --series --hu-offset --picture" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;

@@ -10,8 +10,11 @@
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
 #include "osteo/case_report/case_report.h"
+#include "osteo/dicom/import.h"
 #include "osteo/dicom/scan.h"
 #include "osteo/grid/brick_grid.h"
+#include "osteo/image/planes.h"
+#include "osteo/io/surface_io.h"
 #include "osteo/pipeline/formats.h"
 #include "osteo/scene/approval.h"
 #include "osteo/tets/quality.h"
@@ -190,9 +193,48 @@ cli::CommandInfo SeriesCommand::info() {
           "osteo series DICOM_FOLDER"};
 }
 
+namespace {
+
+// The middle slices of all series; of what is no volume there is none, and it says so.
+void write_thumbnails(const DicomScan& scan, const fs::path& source, const fs::path& folder, cli::Invocation& io) {
+  if (fs::exists(folder) && !fs::is_directory(folder)) throw Error(ExitCode::cannot_write, "'" + folder.string() + "' is no folder");
+  fs::create_directories(folder);
+  std::map<std::string, int> times;
+  for (const DicomSeries& s : scan.series) {
+    std::string name = s.scan + "-" + std::to_string(s.number);
+    // Two series may have one number.
+    if (const int n = ++times[name]; n > 1) name += "-" + std::to_string(n);
+    ImportParams p;
+    p.series = s.uid;
+    p.any_modality = true;
+    try {
+      Context quiet;
+      quiet.threads = io.context.threads;
+      const Image image = import_ct(source, p, quiet).image;
+      // Soft tissue of a CT; of anything else all but its rarest values.
+      std::vector<std::int16_t> some;
+      for (std::size_t i = 0; i < image.frame.voxel_count(); i += std::max<std::size_t>(1, image.frame.voxel_count() / 100000))
+        some.push_back(image.voxels[i]);
+      std::sort(some.begin(), some.end());
+      const bool ct = s.modality == "CT";
+      const double lo = ct ? -160 : some[some.size() / 50], hi = ct ? 240 : some[some.size() - 1 - some.size() / 100];
+      const fs::path path = folder / (name + ".png");
+      if (fs::exists(path) && !io.common.force)
+        throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists", "--force replaces it");
+      save_picture(thumbnail(image, {2, image.frame.dims[2] / 2}, 256, lo, std::max(hi, lo + 1)), path);
+    } catch (const Error& e) {
+      if (e.code() == ExitCode::cannot_write) throw;
+      io.context.info("no thumbnail of " + name + ": " + e.what());
+    }
+  }
+}
+
+}  // namespace
+
 int SeriesCommand::run(const Params& p, cli::Invocation& io) {
   if (io.arguments.size() != 1) throw Error(ExitCode::usage, "which folder? osteo import --list FOLDER");
   const DicomScan scan = scan_dicom(io.arguments[0], {}, io.context);
+  if (!p.thumbnails.empty()) write_thumbnails(scan, io.arguments[0], p.thumbnails, io);
   io.end_progress();
   if (io.common.json) {
     Json j;

@@ -22,9 +22,9 @@ constexpr int kVoxels = BrickGrid::kVoxels;
 constexpr float kForcedHu = 100;
 
 constexpr float kTrace = 1.0F / 256;
-// Measured (docs/accuracy.md): from here on outlines are the better in nearly every body; and how much the field may grow over as far as
-// slices lie apart: with less, ends of bodies suffer, with more, flat slopes.
-constexpr double kThickSlices = 1.3, kHuPerSlice = 200;
+// Measured (docs/accuracy.md): from here on outlines are the better in nearly every body, and of a real skull; in finer slices values are.
+// And how much the field may grow over as far as slices lie apart: with less, ends of bodies suffer, with more, flat slopes.
+constexpr double kThickSlices = 1.3, kThickMm = 1.5, kHuPerSlice = 200;
 // A scan has voxels of every value between tissue and bone; a gap as wide as this is one of made, binned or two-level values.
 constexpr int kOpenHu = 20;
 
@@ -360,7 +360,8 @@ ResampledBone resample_bone(const Image& ct, const Labels& mask, const ResampleP
                              ct.frame.voxel_volume_mm3();
   std::vector<float> field = signed_field(ct, mask, p.lower);
   const grid::SliceAxis slices = grid::slice_axis(ct.frame);
-  const bool outlines = p.between == Between::outlines || (p.between == Between::automatic && slices.ratio > kThickSlices);
+  const bool outlines = p.between == Between::outlines ||
+                        (p.between == Between::automatic && slices.ratio > kThickSlices && ct.frame.spacing_mm[slices.axis] >= kThickMm);
   if (outlines) grid::limit_by_outlines(field, ct.frame, slices.axis, kHuPerSlice / ct.frame.spacing_mm[slices.axis], context);
   context.report("between_slices", std::string(outlines ? "outlines" : "values"));
   const Resampler resampler(ct, field, p);

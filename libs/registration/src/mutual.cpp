@@ -8,6 +8,7 @@
 
 #include "osteo/base/parallel.h"
 #include "osteo/base/portable_math.h"
+#include "osteo/image/planes.h"
 
 namespace osteo::registration {
 namespace {
@@ -272,17 +273,53 @@ Vec3 middle_of_body(const Levels& l) {
   return count > 0 ? sum / count : c.frame.centre_mm();
 }
 
+// Shift of the second against the first where their shadows along the three axes fit best, by phase correlation of sums along them.
+Vec3 shift_of_shadows(const Levels& from, const Levels& to) {
+  const Level &a = from.levels.back(), &b = to.levels.back();
+  const double h = b.frame.spacing_mm.x;
+  // On one upright lattice around the middle of each, as large as both.
+  double reach = 0;
+  for (const Level* l : {&a, &b})
+    for (std::size_t c = 0; c < 3; ++c) reach = std::max(reach, 0.5 * l->frame.dims[c] * l->frame.spacing_mm.x);
+  const int n = std::max(8, 2 * static_cast<int>(std::ceil(1.2 * reach / h)));
+  const auto shadows = [&](const Level& l, float air) {
+    std::array<Plane, 3> s;
+    for (Plane& p : s) p = {n, n, std::vector<float>(static_cast<std::size_t>(n) * static_cast<std::size_t>(n))};
+    const IndexMap m = index_map(l.frame, {}, l.frame.centre_mm());
+    for (int k = 0; k < n; ++k)
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) {
+          const auto mm = [&](int x) { return static_cast<float>((x - 0.5 * (n - 1)) * h); };
+          const auto along = [&](std::size_t r) { return m.row[r][0] * mm(i) + m.row[r][1] * mm(j) + m.row[r][2] * mm(k) + m.shift[r]; };
+          float v = 0;
+          if (!sample(l, along(0), along(1), along(2), v)) continue;
+          v = std::max(0.0F, v - air);
+          s[0].values[static_cast<std::size_t>(k * n + j)] += v;
+          s[1].values[static_cast<std::size_t>(k * n + i)] += v;
+          s[2].values[static_cast<std::size_t>(j * n + i)] += v;
+        }
+    return s;
+  };
+  const auto sa = shadows(a, from.lo), sb = shadows(b, to.lo);
+  std::array<PlaneMatch, 3> m;
+  for (std::size_t c = 0; c < 3; ++c) m[c] = match_by_phase(sa[c], sb[c]);
+  // Each axis is seen twice: the clearer one counts.
+  const auto clearer = [](const PlaneMatch& p, double x, const PlaneMatch& q, double y) { return p.score >= q.score ? x : y; };
+  const Vec3 found =
+      Vec3{clearer(m[1], m[1].dx, m[2], m[2].dx), clearer(m[0], m[0].dx, m[2], m[2].dy), clearer(m[0], m[0].dy, m[1], m[1].dy)} * h;
+  return b.frame.centre_mm() - a.frame.centre_mm() + found;
+}
+
 std::vector<RigidTransform> starts(const Samples& s, const Levels& from, const Levels& to) {
   std::vector<RigidTransform> all;
-  // Where the files put them; then one middle upon the other, of the bodies and of the scans.
+  // Where the files put them; where the bodies' middles meet; where their shadows fit.
   struct Place {
     Vec3 shift;
     int reach;
   };
-  const Vec3 bodies = middle_of_body(to) - middle_of_body(from),
-             boxes = to.levels.back().frame.centre_mm() - from.levels.back().frame.centre_mm();
+  const Vec3 bodies = middle_of_body(to) - middle_of_body(from);
   constexpr double kStepMm = 25, kTurn = 13 * std::numbers::pi / 180;
-  for (const Place& place : {Place{{}, 2}, Place{bodies, 1}, Place{boxes, 1}}) {
+  for (const Place& place : {Place{{}, 2}, Place{bodies, 1}, Place{shift_of_shadows(from, to), 1}}) {
     for (int a = 0; a < 125; ++a) {
       const Vec3 turn = Vec3{a % 5 - 2.0, a / 5 % 5 - 2.0, a / 25 - 2.0} * kTurn;
       const double angle = length(turn);

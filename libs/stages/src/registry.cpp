@@ -4,6 +4,7 @@
 #include "osteo/stages/curve.h"
 #include "osteo/stages/distance.h"
 #include "osteo/stages/edit.h"
+#include "osteo/stages/enhance.h"
 #include "osteo/stages/image.h"
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
@@ -19,6 +20,8 @@ Registry osteo_stages() {
   registry.add<ImportStage>();
   registry.add<ImportBoneStage>();
   registry.add<CropStage>();
+  registry.add<DenoiseStage>();
+  registry.add<ReduceMetalStage>();
   registry.add<ThresholdStage>();
   registry.add<ApplyEditsStage>();
   registry.add<ResampleStage>();

@@ -10,7 +10,8 @@
 namespace osteo {
 
 /// How the boundary of bone runs from slice to slice. values: by interpolated HU. outlines: also by the slices' outlines, which makes no
-/// step half-way between slices that lie far apart. automatic: outlines where slices lie over 1.3 times as far apart as pixels.
+/// step half-way between slices that lie far apart. automatic: outlines where slices lie 1.5 mm or more and over 1.3 times as far
+/// apart as pixels.
 enum class Between : int { automatic, values, outlines };
 template <>
 struct EnumNames<Between> {

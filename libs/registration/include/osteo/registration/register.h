@@ -48,7 +48,7 @@ struct Registration {
 };
 
 /// The rigid transform between two scans of one head that may lie anywhere to each other: turned by up to 40 degrees and moved by up to
-/// 100 mm from where their files say, or from where their bodies' middles meet.
+/// 60 mm from where their files say, or from where their bodies' middles meet.
 ///
 /// A search over turns and shifts on a coarse level, then the simplex method of Nelder and Mead on ever finer ones, by normalized mutual
 /// information (C. Studholme et al., An overlap invariant entropy measure of 3D medical image alignment, Pattern Recognition 1999). It

@@ -15,7 +15,8 @@ struct ResampleStage {
     visit({"between",
            "how the boundary runs from slice to slice: values takes interpolated HU, which makes a step where slices lie far apart; "
            "outlines moves "
-           "the slices' outlines into each other; automatic: outlines where slices lie over 1.3 times as far apart as pixels"},
+           "the slices' outlines into each other; automatic: outlines where slices lie 1.5 mm or more and over 1.3 times as far apart as "
+           "pixels"},
           p.between);
     visit({"box_mm", "only a box of this size: a region of interest in a coarser bone (0,0,0: all)", "mm", 0, 1000}, p.box_mm);
     visit({"centre_mm", "middle of the box, LPS", "mm"}, p.centre_mm);
