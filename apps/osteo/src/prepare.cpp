@@ -77,8 +77,9 @@ std::string quoted(const std::string& text) {
   return text.empty() || text.find_first_of(" '\"$;()") != std::string::npos ? "'" + text + "'" : text;
 }
 
-// As it is written on a command line: --lower 500, --set keep_largest=1, --remove-table.
-std::string flag_of(const std::string& name, const std::string& value, const std::vector<FieldRef>& fields) {
+// As it is written on a command line: --lower 500, --set keep_largest=1, --remove-table. Messages end up in logs: no UID.
+std::string flag_of(const std::string& name, const std::string& given, const std::vector<FieldRef>& fields) {
+  const std::string value = without_uid(given);
   for (const FieldRef& f : fields) {
     if (f.doc.name != name) continue;
     if (f.kind() != "flag") return f.flag() + " " + quoted(value);
