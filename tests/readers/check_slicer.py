@@ -186,6 +186,13 @@ assert "nothing changed" in osteo("take-back", "CASE", "OUT2")
 osteo("prepare", "-o", "CASE", "--spacing-mm", 1, "--quiet")  # keeps the correction
 osteo("hand-over", "CASE", "OUT3", "--quiet")
 assert np.array_equal(segments_of(work / "OUT3/bone.seg.nrrd")[0][0].mask, edited)
+text = (work / "CASE/corrected-pipeline.json").read_text()
+assert str(work) not in text, "the case holds the name of its folder"
+(work / "CASE").rename(work / "MOVED")  # a case may be moved
+osteo("hand-over", "MOVED", "OUT-MOVED", "--quiet")
+assert np.array_equal(segments_of(work / "OUT-MOVED/bone.seg.nrrd")[0][0].mask, edited)
+osteo("prepare", "-o", "MOVED", "--spacing-mm", 1.5, "--quiet")
+(work / "MOVED").rename(work / "CASE")
 osteo("prepare", "-o", "CASE", "--no-pipeline", "--quiet")  # back to the threshold
 osteo("hand-over", "CASE", "OUT4", "--quiet")
 assert np.array_equal(segments_of(work / "OUT4/bone.seg.nrrd")[0][0].mask, bone[0].mask)

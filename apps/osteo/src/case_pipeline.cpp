@@ -48,7 +48,9 @@ Pipeline up_to(const Pipeline& pipeline, const std::vector<std::string>& ids) {
 
 }  // namespace
 
-std::string flag_of(const std::string& name, const std::string& value, const std::vector<FieldRef>& fields) {
+// Messages end up in logs: no UID.
+std::string flag_of(const std::string& name, const std::string& given, const std::vector<FieldRef>& fields) {
+  const std::string value = without_uid(given);
   for (const FieldRef& f : fields) {
     if (f.doc.name != name) continue;
     if (f.kind() != "flag") return f.flag() + " " + quoted(value);

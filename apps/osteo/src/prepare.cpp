@@ -11,6 +11,7 @@
 #include "osteo/cli/report.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/case.h"
+#include "osteo/scene/hand_over.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {
@@ -183,7 +184,7 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     recipe.pipeline_hash = hash_path(p.pipeline);
     remember(recipe.pipeline_hash, fs::absolute(p.pipeline).string());
   } else if (!recipe.pipeline_hash.empty()) {
-    const auto path = recall_file(recipe.pipeline_hash);
+    const auto path = pipeline_file(folder, recipe.pipeline_hash);
     if (!path) {
       throw Error(ExitCode::no_input,
                   "the pipeline file that '" + folder.string() + "' was made with is not known here, or was moved or changed",

@@ -30,7 +30,7 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
                 "run this on the machine where the case was made, or 'osteo prepare' with all flags first");
   CasePipeline made{std::string(kTemporalBonePipeline), recipe->settings};
   if (!recipe->pipeline_hash.empty()) {
-    const auto path = recall_file(recipe->pipeline_hash);
+    const auto path = pipeline_file(folder, recipe->pipeline_hash);
     if (!path)
       throw Error(ExitCode::no_input, "the pipeline file of the case is not known here, or was moved or changed",
                   "run 'osteo prepare -o " + folder.string() + " --pipeline FILE' first");
@@ -161,9 +161,10 @@ int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
     }
   }
   if (back.bone_changed) {
-    const fs::path mask = fs::absolute(folder) / "corrected-bone.nrrd", file = fs::absolute(folder) / "corrected-pipeline.json";
-    save_labels(*back.bone, mask);
-    write_file(file, with_mask_from(pipeline, mask));
+    const fs::path file = folder / kCorrectedPipeline;
+    const std::string text = with_corrected_bone(pipeline);
+    save_labels(*back.bone, folder / kCorrectedBone);
+    write_file(file, text);
     prepare.pipeline = file.string();
     again.given.insert("pipeline");
   }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -109,8 +110,20 @@ std::string without_identity(const std::string& name, const std::set<std::string
 
 bool bone_kernel(const DicomSeries& s, const std::string& manufacturer) {
   const std::string kernel = lower_case(s.kernel), maker = lower_case(manufacturer), text = lower_case(s.description);
-  for (const char* word : {"bone", "knochen", "osseux", "hueso", "osso", "petr", "temporal", "mastoid", "iac", "edge", "sharp"}) {
+  for (const char* word : {"bone", "knochen", "osseux", "hueso", "osso", "petr", "temporal", "mastoid", "sharp"}) {
     if (text.find(word) != std::string::npos || kernel.find(word) != std::string::npos) return true;
+  }
+  // Words of their own: "IAC" is no "cardiac" or "iliac", "edge" no "wedge".
+  for (const std::string& where : {text, kernel}) {
+    std::string word;
+    for (const char c : where + ' ') {
+      if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+        word += c;
+        continue;
+      }
+      if (word == "iac" || word == "iacs" || word == "edge") return true;
+      word.clear();
+    }
   }
   const auto number = [&]() {
     const std::size_t at = kernel.find_first_of("0123456789");

@@ -99,15 +99,19 @@ Frame lattice_of(const Placement& p, int columns, int rows, Vec3 h) {
   return f;
 }
 
-// Where an upright, even series only has holes, the slices that are there stay as they are.
+// Layers lie on the slices where these are as far apart as ever, with or without holes: upright ones then stay as they are, leaning ones
+// are interpolated in their own plane only.
 double layer_distance(const Placement& p) {
-  const double pitch = p.verdict.gap_min_mm;
-  const bool only_holes = std::all_of(p.slices.begin(), p.slices.end(), [&](const PlacedSlice& s) {
-    return std::abs(s.along_mm - std::round(s.along_mm / pitch) * pitch) <= kSamePlaceMm &&
-           std::hypot(s.sideways_mm[0], s.sideways_mm[1]) <= kSamePlaceMm;
+  const double pitch = p.verdict.gap_min_mm, extent = p.slices.back().along_mm;
+  const double wanted = std::max(std::min(pitch, 0.5), std::min(p.column_spacing_mm, p.row_spacing_mm));
+  const bool regular = std::all_of(p.slices.begin(), p.slices.end(), [&](const PlacedSlice& s) {
+    return std::abs(s.along_mm - std::round(s.along_mm / pitch) * pitch) <= kSamePlaceMm;
   });
-  if (only_holes) return p.slices.back().along_mm / std::round(p.slices.back().along_mm / pitch);
-  return std::max(std::min(pitch, 0.5), std::min(p.column_spacing_mm, p.row_spacing_mm));
+  if (!regular) return wanted;
+  const bool upright = std::all_of(p.slices.begin(), p.slices.end(),
+                                   [](const PlacedSlice& s) { return std::hypot(s.sideways_mm[0], s.sideways_mm[1]) <= kSamePlaceMm; });
+  const double each = upright ? 1 : std::max(1.0, std::round(pitch / wanted));
+  return extent / (std::round(extent / pitch) * each);
 }
 
 void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count, const PlaceOptions& options) {

@@ -13,6 +13,7 @@
 #include "osteo/base/param.h"
 #include "osteo/io/segments.h"
 #include "osteo/io/volume_io.h"
+#include "osteo/scene/recipe.h"
 
 namespace osteo {
 namespace {
@@ -405,7 +406,15 @@ TakenBack take_back(const CaseImages& images, const fs::path& folder, const Take
   return Taker(images, options, context).run(folder);
 }
 
-std::string with_mask_from(const CasePipeline& from, const fs::path& mask) {
+std::optional<fs::path> pipeline_file(const fs::path& case_folder, const std::string& hash) {
+  if (auto path = recall_file(hash)) return path;
+  const fs::path own = case_folder / kCorrectedPipeline;
+  std::error_code ec;
+  if (fs::is_regular_file(own, ec) && hash_path(own) == hash) return own;
+  return std::nullopt;
+}
+
+std::string with_corrected_bone(const CasePipeline& from) {
   const Pipeline pipeline = parse_pipeline(from.text, from.settings);
   const Parts parts = parts_of(pipeline);
   const std::string mask_id = parts.mask == nullptr ? std::string() : parts.mask->id;
@@ -433,7 +442,8 @@ std::string with_mask_from(const CasePipeline& from, const fs::path& mask) {
         for (const Json::Member& port : in->members()) {
           const std::string* const node = port.value.text();
           const bool of_mask = !mask_id.empty() && node != nullptr && (*node == mask_id || node->starts_with(mask_id + "."));
-          if (of_mask || (name == parts.bone->id && port.key == "mask")) copy["in"][port.key] = Json{{"file", mask.string()}};
+          if (of_mask || (name == parts.bone->id && port.key == "mask"))
+            copy["in"][port.key] = Json{{"file", "${case}/" + std::string(kCorrectedBone)}};
         }
       }
       if (name == parts.bone->id && !lower.empty()) copy["params"]["lower"] = lower;

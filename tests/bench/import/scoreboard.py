@@ -3,7 +3,7 @@
 #
 # How it is judged, alike for all: what a reader writes is looked at in the patient's space. The centres of the true pixels are carried into
 # the volume by its own matrix. Where they fall on voxels, the values must be those of the files (to half a HU). Where they fall between
-# (a resampled volume), each slice's content must lie where it lies (nearer than any place half a pixel or half a slice off) and its
+# (a resampled volume), each slice's content must lie where it lies (nearer than any place half a pixel or, along the normal, half a slice or half a millimetre off) and its
 # values on one line with the truth (slope within 10 %, mean within 12 HU). A reader that writes several volumes is right with one of them. Where slices
 # are left out, filled in or chosen from, it must have said so, by a line with "warning", "error" or "missing".
 #   right    the volume is right, or a refusal was
@@ -83,7 +83,7 @@ def slice_is_right(volume, s, gap):
     normal = np.cross(s.row, s.column)
     here, found = off(0)
     if not np.isfinite(here): return False
-    for axis, step in ((s.row, s.pixel[0]), (s.column, s.pixel[1]), (normal, gap)):
+    for axis, step in ((s.row, s.pixel[0]), (s.column, s.pixel[1]), (normal, min(gap, 1.0))):
         if min(off(axis * step / 2)[0], off(axis * -step / 2)[0]) < here: return False
     keep = np.isfinite(found)
     slope, level = np.polyfit(found[keep], true[keep], 1) if np.ptp(found[keep]) > 0 else (0, 0)

@@ -232,6 +232,51 @@ TEST(MixedSeries, C71_BothEarsSideBySide) {
   EXPECT_TRUE(r.verdict.has(code::shifted_sideways));
 }
 
+// By its description, a word at a time.
+TEST(MixedSeries, WhichKernelIsBones) {
+  for (const auto& [description, bone] : {std::pair{"CARDIAC 1.0", false},
+                                          {"sacroiliac", false},
+                                          {"wedge", false},
+                                          {"IAC 0.6", true},
+                                          {"Mastoid L", true},
+                                          {"EDGE+", true},
+                                          {"soft", false}}) {
+    Series s("kernel", slices(0, 12));
+    s.edit_all([&, text = description](DcmDataset& d, int) {
+      put(d, DCM_SeriesDescription, text);
+      put(d, DCM_ConvolutionKernel, "B");
+    });
+    const DicomScan scan = scan_dicom(s.folder);
+    ASSERT_EQ(scan.series.size(), 1u);
+    EXPECT_EQ(scan.series[0].why.find("bone kernel") != std::string::npos, bone) << description;
+  }
+}
+
+// What a refusal for the scale of the values shows.
+TEST(MixedSeries, C28_ThePictureOfARefusal) {
+  Series s("c28-picture", slices(0, 20));
+  EXPECT_EQ(picture_of(load(s.folder).verdict), "");
+  s.edit_all([](DcmDataset& d, int) {
+    Uint16* pixels = nullptr;
+    ASSERT_TRUE(d.findAndGetUint16Array(DCM_PixelData, const_cast<const Uint16*&>(pixels)).good());
+    double slope = 1, intercept = 0;
+    d.findAndGetFloat64(DCM_RescaleSlope, slope);
+    d.findAndGetFloat64(DCM_RescaleIntercept, intercept);
+    for (int i = 0; i < 512 * 512; ++i) pixels[i] = static_cast<Uint16>(std::max(0.0, pixels[i] * slope + intercept + 1024));
+    put(d, DCM_RescaleIntercept, "0");
+    put(d, DCM_RescaleSlope, "1");
+  });
+  try {
+    static_cast<void>(load(s.folder));
+    ADD_FAILURE() << "not refused";
+  } catch (const Refused& e) {
+    EXPECT_TRUE(e.verdict().has(code::hu_shifted));
+    const std::string svg = picture_of(e.verdict());
+    EXPECT_NE(svg.find("--hu-offset -1024"), std::string::npos);
+    EXPECT_TRUE(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
+  }
+}
+
 // Resampled layers reach as far as the slices do.
 TEST(MixedSeries, TheLastSliceIsInTheVolume) {
   Series s("last", slices(0, 24));

@@ -28,10 +28,10 @@ struct DicomVolume {
 
 /// The series as a volume in LPS mm. Slices are placed by their own position and orientation. Evenly spaced slices that stand
 /// straight above each other come out voxel for voxel; a tilted gantry or uneven distances are resampled onto upright, even
-/// slices: linear in the slice and between slices, at the finest distance (at most 0.5 mm, at least a pixel), without padding
-/// taking part. Where slices are only missing, those that are there stay voxel for voxel. Slices are read and decoded in parallel; a file
-/// whose pixels are damaged counts as missing. Memory: the volume (and, when resampled, the slices besides). Throws Refused for whatever
-/// cannot be placed rightly; see verdict.h for the codes.
+/// slices: linear in the slice and between slices, at the finest distance (at most 0.5 mm, at least a pixel; so that layers lie on the
+/// slices where these are as far apart as ever), without padding taking part. Where slices are only missing, those that are there stay
+/// voxel for voxel. Slices are read and decoded in parallel; a file whose pixels are damaged counts as missing. Memory: the volume (and,
+/// when resampled, the slices besides). Throws Refused for whatever cannot be placed rightly; see verdict.h for the codes.
 [[nodiscard]] DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& options = {}, const Context& context = {});
 
 /// The same series straight onto a lattice of `spacing_mm`, upright above the slices, a few layers at a time.

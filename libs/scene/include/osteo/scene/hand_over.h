@@ -67,7 +67,14 @@ struct TakeBackOptions {
 [[nodiscard]] TakenBack take_back(const CaseImages& images, const std::filesystem::path& folder, const TakeBackOptions& options = {},
                                   const Context& context = {});
 
-/// The pipeline with the file `mask` in place of the stage that made the mask; its fixed threshold stays that of the boundary.
-[[nodiscard]] std::string with_mask_from(const CasePipeline& pipeline, const std::filesystem::path& mask);
+/// The pipeline with kCorrectedBone in place of the stage that made the mask; its fixed threshold stays that of the boundary. It names the
+/// file by the variable "case" alone, so that no folder's name gets into the case, and the case can be moved.
+[[nodiscard]] std::string with_corrected_bone(const CasePipeline& pipeline);
+
+/// Files that a correction leaves in its case.
+inline constexpr std::string_view kCorrectedBone = "corrected-bone.nrrd", kCorrectedPipeline = "corrected-pipeline.json";
+
+/// The pipeline file of this content: where it was last seen, or the corrected one in the case. None where it is not known.
+[[nodiscard]] std::optional<std::filesystem::path> pipeline_file(const std::filesystem::path& case_folder, const std::string& hash);
 
 }  // namespace osteo
