@@ -26,8 +26,9 @@ struct CaseReport {
 
 /// Writes both. `asked_for`: the flags that the case was made with, as a person writes them. Pictures of a report that is there and of this
 /// state of the case are kept, so that the scan is needed once. Says nothing that identifies the patient but what the cuts show.
-/// The case itself is not touched. A report that was signed and still holds is left as it is, also by a later version of the program. 1 to
-/// 6 s for a head of 3 million triangles. Errors: as of load_case; cannot_write; failed without OpenGL or fonts.
+/// The case itself is not touched. A report that was signed and still holds is left as it is, also by a later version of the program.
+/// About 11 s of one core for a head of 3 million triangles drawn in software, most of it OpenGL; 1.5 s where the pictures are kept.
+/// Errors: as of load_case; cannot_write; failed without OpenGL or fonts.
 CaseReport write_case_report(const std::filesystem::path& case_folder, const std::string& asked_for, const std::optional<CaseScan>& scan,
                              const Context& context = {});
 
