@@ -187,7 +187,7 @@ Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubePara
     }
     if (i > 0) longest = std::max(longest, length(p - points_mm[i - 1]));
   }
-  if (longest < 0.5) throw Error(ExitCode::usage, "the points of the tube are all the same");
+  if (length(hi - lo) < 0.5) throw Error(ExitCode::usage, "the points of the tube are all the same");
   const double margin = std::clamp(0.35 * longest, 5.0, 15.0);
   const Vec3 s = ct.frame.spacing_mm, rim{margin, margin, margin};
   const double h = std::clamp(0.8 * std::min({s.x, s.y, s.z}), 0.3, 0.6);

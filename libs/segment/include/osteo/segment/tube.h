@@ -26,7 +26,7 @@ struct TubeParams {
   double max_radius_mm = 2.5;  ///< 0.2 to 5
   double content_hu = 40;      ///< what fills a nerve's canal; thin canals show less of it. Vessels: not used
   double snap_mm = 1;          ///< a given point may move this far to the nearest tube
-  double max_unsure_mm = 5;    ///< a longer stretch without walls and without a given point is an error
+  double max_unsure_mm = 4;    ///< a longer stretch without walls and without a given point is an error
 };
 
 /// A place along the centre line.
