@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures register phantom list info series guide convert run prepare scene plan rehearse replay export devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -23,6 +23,8 @@ _osteo() {
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
+    "tube --kind") COMPREPLY=($(compgen -W "nerve vessel " -- "$cur")); return ;;
+    "find-structures --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
     "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
@@ -42,7 +44,8 @@ _osteo() {
     crop) flags="$flags --xml --describe --region --centre-mm --size-mm --labels --labels-out" ;;
     denoise) flags="$flags --xml --describe --strength" ;;
     reduce-metal) flags="$flags --xml --describe --metal-hu --least-mm2" ;;
-    threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
+    threshold) flags="$flags --xml --describe --preset --lower --upper --core --remove-table --keep-table --metal-mm --metal-hu --metal-lower --close-mm --fill-mm3 --min-volume-mm3 --keep-largest --connectivity" ;;
+    apply-edits) flags="$flags --xml --describe --labels --structures-out --edits-out" ;;
     resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
@@ -61,6 +64,8 @@ _osteo() {
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;
     snapshot) flags="$flags --xml --describe --width --height --view --bone-hu --centre-mm --title --mask --surface" ;;
     structures) flags="$flags --xml --describe --names --only-named --image" ;;
+    tube) flags="$flags --xml --describe --points-mm --name --kind --max-radius-mm --content-hu --snap-mm --max-unsure-mm --points --labels --line-out" ;;
+    find-structures) flags="$flags --xml --describe --side --what --labyrinth-mm --least-quality --findings-out" ;;
     register) flags="$flags --xml --describe --method --finest-mm --bone-hu --max-residual-mm --accept-poor --labels --findings-out --moved-out --labels-out --checkerboard-out" ;;
     phantom) flags="$flags --xml --describe --region --spacing-mm --slice-mm --noise-hu --individual --labels-out" ;;
     list) flags="$flags" ;;
@@ -69,12 +74,18 @@ _osteo() {
     guide) flags="$flags --series --hu-offset --picture" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
-    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --structures --names --series --axes --hu-offset --pipeline --fresh" ;;
+    prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --keep-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh --no-report" ;;
+    report) flags="$flags --scan" ;;
+    approve) flags="$flags --by --note --withdraw" ;;
+    edit) flags="$flags --apply --scan --width --height --state-file" ;;
+    hand-over) flags="$flags --source" ;;
+    take-back) flags="$flags --source --by-place --check" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
+    sound) flags="$flags --volume --alarms --case-folder" ;;
     devices) flags="$flags --watch --recording" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;

@@ -9,11 +9,11 @@ void bench_geometry(const Context& context);  ///< distances, voxels, tetrahedra
 void bench_haptics(const Context& context);   ///< contact, removal, god-object, stability, real time
 void bench_haptics_hands(const Context& context);
 void bench_haptics_fuzz(const Context& context);
-void bench_removal(const Context& context);    ///< what is removed against what the burr swept
-void bench_operation(const Context& context);  ///< scenes that are operated on: latency, split, plates, regions
-void bench_tissue(const Context& context);     ///< finite elements, the fast model, its calibration
+void bench_removal(const Context& context);       ///< what is removed against what the burr swept
+void bench_operation(const Context& context);     ///< scenes that are operated on: latency, split, plates, regions
+void bench_tissue(const Context& context);        ///< finite elements, the fast model, its calibration
 void bench_slices(const Context& context);        ///< bone from thick slices
 void bench_registration(const Context& context);  ///< a second scan onto the first
-void bench_import(const Context& context);     ///< DICOM to a volume
+void bench_import(const Context& context);        ///< DICOM to a volume
 
 }  // namespace osteo

@@ -252,7 +252,8 @@ int PrepareCommand::run(const Params& p, cli::Invocation& io) {
     if (names_file || value.find('/') != std::string::npos || without_uid(value) != value) recipe.withheld.insert(name);
   }
 
-  Pipeline pipeline = case_pipeline(text, recipe, source.path, structures.path, as_the_case_holds_them, folder, edits, given.contains("lower") || given.contains("preset"));
+  Pipeline pipeline = case_pipeline(text, recipe, source.path, structures.path, as_the_case_holds_them, folder, edits,
+                                    given.contains("lower") || given.contains("preset"));
   const std::string name = pipeline.name;
   validate(pipeline, io.registry);
 

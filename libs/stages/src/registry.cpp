@@ -8,8 +8,8 @@
 #include "osteo/stages/image.h"
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
-#include "osteo/stages/segment.h"
 #include "osteo/stages/register.h"
+#include "osteo/stages/segment.h"
 #include "osteo/stages/snapshot.h"
 #include "osteo/stages/tissue.h"
 
