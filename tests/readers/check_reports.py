@@ -112,7 +112,8 @@ assert signed != before and cut(signed) == cut(before)
 page = page_of(html_file)
 assert "Łucja Żak <x>" in " ".join(page.texts) and wanted <= set(page.pictures)
 if poppler:
-    assert "Łucja Żak <x>" in pdf_text()
+    said = pdf_text()  # each once, and the labels under the lines
+    assert said.count("Łucja Żak <x>") == 1 and said.count("mastoid only") == 1 and "approved by" in said, said
 assert json.loads(osteo("info", "case", "--json")[0])["approval"]["state"] == "valid"
 said = osteo("info", "case")[0]
 assert "approved by Łucja Żak <x> on 20" in said and re.search(r"^Asked for .*--lower 500", said, re.M), said

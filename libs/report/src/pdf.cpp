@@ -174,8 +174,9 @@ double draw_signature(const Pen& pen, const sheet::Signature& s, double x, doubl
     pen.text(name, from, base + 1.5, width, {kTextPt - 1.6, false, ink(Tone::quiet), PANGO_ALIGN_LEFT, 1});
     if (text.empty()) return;
     const Style style{kTextPt, false, ink(Tone::plain), PANGO_ALIGN_LEFT, lines};
-    const double height = Pen(pen).text(text, from, base, width, style);
-    if (pen.on) pen.text(text, from, base - height - 1, width, style);
+    Pen measure = pen;
+    measure.on = false;
+    pen.text(text, from, base - measure.text(text, from, base, width, style) - 1, width, style);
   };
   field("approved by", s.by, x + 2 * kPad, third - 4 * kPad, 2);
   field("date", s.date, x + third, third * 0.5 - 2 * kPad, 1);

@@ -61,6 +61,29 @@ StageInfo TubeStage::info() {
       .example = "osteo tube ct.nrrd nerve.seg.nrrd --points-mm '36,-2,-12; 42,7,-18; 46,8,-38' --line-out nerve.csv"};
 }
 
+namespace {
+
+// Walls are met on a wrong way as well: among air cells each has its own. What tells is that it is long.
+void warn_of_detours(const Tube& tube, std::span<const Vec3> points, const Context& context) {
+  constexpr double kLong = 1.35, kExtraMm = 2.5;
+  std::size_t from = 0;
+  for (std::size_t leg = 1; leg < points.size() && from < tube.stations.size(); ++leg) {
+    std::size_t to = from;
+    for (std::size_t s = from; s < tube.stations.size(); ++s) {
+      if (length(tube.stations[s].at_mm - points[leg]) < length(tube.stations[to].at_mm - points[leg])) to = s;
+    }
+    const double way = tube.stations[to].arc_mm - tube.stations[from].arc_mm, straight = length(points[leg] - points[leg - 1]);
+    if (way > kLong * straight && way > straight + kExtraMm) {
+      context.warn("from point " + std::to_string(leg) + " to " + std::to_string(leg + 1) + " the way is " +
+                   format_number(rounded(way, 10)) + " mm for " + format_number(rounded(straight, 10)) +
+                   " mm of straight line: it may be a detour; look at it, and give a point before and behind each bend");
+    }
+    from = to;
+  }
+}
+
+}  // namespace
+
 std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const auto& ct = std::get<Image>(inputs[0]);
   const auto* const file = std::get_if<Source>(&inputs[1]);
@@ -83,6 +106,7 @@ std::vector<Data> TubeStage::run(const Params& p, std::span<const Data> inputs, 
     context.report("unsure_mm", unsure);
     context.warn("not sure of the " + p.name + " from " + unsure + " mm: no walls are seen there");
   }
+  warn_of_detours(tube, points, context);
   std::string csv = "x_mm,y_mm,z_mm,radius_mm,along_mm,confidence\n";
   for (const TubeStation& s : tube.stations) {
     for (const double v : {s.at_mm.x, s.at_mm.y, s.at_mm.z, s.radius_mm, s.arc_mm}) csv += format_number(rounded(v, 1000)) + ",";

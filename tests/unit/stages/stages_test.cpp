@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "meshes.h"
 #include "osteo/base/error.h"
 #include "osteo/data/tet_mesh.h"
+#include "osteo/stages/segment.h"
 
 namespace osteo {
 namespace {
@@ -146,6 +150,37 @@ TEST(Tetrahedralize, CleanMendsFirst) {
   const auto out = TetrahedralizeStage::run(p, std::span(&in, 1), context);
   EXPECT_EQ(reported<std::int64_t>(context.take_report(), "triangles_turned"), 1);
   EXPECT_NEAR(volume_mm3(*std::get<Tets>(out[0])), enclosed_volume_mm3(mesh_of(test::sphere(6, 2))), 25);
+}
+
+// A canal of 2 mm from one place to another, 14 mm apart, in a half circle or straight, in 0.5 mm voxels of dense bone.
+Image canal(bool bent) {
+  Frame f;
+  f.dims = {56, 40, 24};
+  f.spacing_mm = {0.5, 0.5, 0.5};
+  auto voxels = std::make_shared<std::int16_t[]>(f.voxel_count());
+  std::size_t n = 0;
+  for (int k = 0; k < f.dims[2]; ++k)
+    for (int j = 0; j < f.dims[1]; ++j)
+      for (int i = 0; i < f.dims[0]; ++i) {
+        const Vec3 p = f.world_from_index({double(i), double(j), double(k)}), q = p - Vec3{13, 13, 6};
+        const double ring = std::hypot(std::hypot(q.x, std::min(q.y, 0.0)) - 7, q.z) + (q.y > 0 ? std::max(0.0, q.y - 2) : 0);
+        const double d = bent ? ring : std::hypot(q.y, q.z) + std::max(0.0, std::abs(q.x) - 7);
+        voxels[n++] = static_cast<std::int16_t>(40 + 1460 * std::clamp((d - 1) / 0.5 + 0.5, 0.0, 1.0));
+      }
+  return {f, voxels};
+}
+
+TEST(Tube, AWayMuchLongerThanTheStraightLineIsTold) {
+  for (const bool bent : {false, true}) {
+    std::string said;
+    Context context;
+    context.on_log([&](LogLevel, std::string_view text) { said += text; });
+    TubeStageParams p;
+    p.points_mm = "6,13,6; 20,13,6";
+    const Data inputs[] = {canal(bent), {}, {}};
+    static_cast<void>(TubeStage::run(p, inputs, context));
+    EXPECT_EQ(said.find("from point 1 to 2 the way is") != std::string::npos, bent) << said;
+  }
 }
 
 }  // namespace
