@@ -231,6 +231,20 @@ with Screen("1024x700") as screen:
     assert "look at it" in osteo("edit", "copy", "--apply", "none.json")
     osteo("scene", "copy")  # structures at risk: none
     osteo("edit", "copy", "--apply", "case/edits.json", "--quiet")
+    # To 3D Slicer and back: what was corrected here goes along, and is not done again on top of what comes back.
+    osteo("hand-over", "copy", "handed", "--quiet")
+    segment = pathlib.Path("handed/bone.seg.nrrd")
+    head, body = segment.read_bytes().split(b"\n\n", 1)
+    voxels = bytearray(gzip.decompress(body))
+    assert sum(voxels) == sum(1 for b in mask if b), "the corrections were not handed over"
+    shutil.copytree("copy", "returned")
+    first = voxels.index(1)
+    voxels[first] = 0
+    segment.write_bytes(head + b"\n\n" + gzip.compress(bytes(voxels)))
+    osteo("take-back", "returned", "handed", "--quiet")
+    assert not pathlib.Path("returned/edits.json").exists() and pathlib.Path("returned/edits-dropped.json").exists()
+    osteo("hand-over", "returned", "again", "--quiet")
+    assert gzip.decompress(pathlib.Path("again/bone.seg.nrrd").read_bytes().split(b"\n\n", 1)[1]) == bytes(voxels)
     osteo("prepare", "-o", "copy", "--no-edits", "--quiet")
     assert pathlib.Path("copy/bone.vdb").read_bytes() == bone_before and not pathlib.Path("copy/edits.json").exists()
     assert pathlib.Path("copy/edits-dropped.json").read_bytes() == saved["edits.json"]
@@ -259,7 +273,7 @@ with Screen("1024x700") as screen:
     w.x("key", "q")
     w.end()
 
-# Nothing of the scan lies about.
-made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json"}
-assert all(n.startswith("state") or n.endswith(".prov.json") for n in made), made
+# Nothing of the scan lies about but in the reports, which say that they hold pictures of it.
+made = {p.name for p in work.iterdir()} - files_before - {"mask.nrrd", "corrected.nrrd", "copy", "other", "other.nrrd", "none.json", "handed", "returned", "again"}
+assert all(n.startswith("state") or n.endswith(".prov.json") or ".report." in n for n in made), made
 print("window edit: all as it should be")

@@ -3,11 +3,13 @@
 #include <cmath>
 #include <ostream>
 
+#include "case_edits.h"
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
 #include "osteo/base/param.h"
+#include "osteo/edit/document.h"
 #include "osteo/io/segments.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/scene/case.h"
@@ -52,6 +54,25 @@ CasePipeline pipeline_of(const fs::path& folder, const std::string& named_source
   made.settings["source"] = source.string();
   made.settings["case"] = folder.string();
   return made;
+}
+
+// As the case has them now: with what was corrected by hand in 'osteo edit'.
+CaseImages images_now(const CasePipeline& pipeline, const fs::path& folder, std::optional<CaseEdits>& edits, const cli::Invocation& io) {
+  CaseImages images = images_of_case(pipeline, folder, io.registry, io.context);
+  Recipe recipe = *read_recipe(folder);
+  std::vector<std::string> notes;
+  edits = edits_of_case(folder, std::nullopt, recipe, notes);
+  if (edits) {
+    // The structures it began with; corrected ones are in `images` already.
+    std::optional<Labels> given;
+    if (fs::exists(folder / kGivenStructures)) given = load_labels(folder / kGivenStructures);
+    EditDocument document(images.ct, images.bone, given ? &*given : nullptr);
+    apply_edits(document, edits->recipe, io.context);
+    const std::vector<Structure> named = images.bone.structures;
+    images.bone = document.bone_labels(io.context.threads);
+    images.bone.structures = named;
+  }
+  return images;
 }
 
 std::string mm3(double v) {
@@ -103,7 +124,8 @@ int HandOverCommand::run(const Params& p, cli::Invocation& io) {
   if (output_exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw Error(ExitCode::cannot_write, "'" + folder.string() + "' exists already",
                 "give a new folder: what was edited there is not written over");
-  const CaseImages images = images_of_case(pipeline_of(io.arguments[0], p.source), io.arguments[0], io.registry, io.context);
+  std::optional<CaseEdits> edits;
+  const CaseImages images = images_now(pipeline_of(io.arguments[0], p.source), io.arguments[0], edits, io);
   hand_over(images, folder);
   io.end_progress();
   if (io.common.quiet) return 0;
@@ -130,8 +152,9 @@ cli::CommandInfo TakeBackCommand::info() {
 int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0], from = io.arguments[1];
   const CasePipeline pipeline = pipeline_of(folder, p.source);
-  const CaseImages images = images_of_case(pipeline, folder, io.registry, io.context);
-  const TakenBack back = take_back(images, from, {p.by_place}, io.context);
+  std::optional<CaseEdits> edits;
+  const CaseImages images = images_now(pipeline, folder, edits, io);
+  TakenBack back = take_back(images, from, {p.by_place}, io.context);
   io.end_progress();
   if (io.common.json) {
     io.out << changes_json(back).dump(2) << '\n';
@@ -152,6 +175,20 @@ int TakeBackCommand::run(const Params& p, cli::Invocation& io) {
   prepare.out = folder.string();
   again.given.insert("out");
   again.common.json = false;
+  if (edits) {
+    // What was corrected here is in what came back, or stays in what did not: done again on top of it, it would count twice.
+    if (!back.bone_changed) back.bone = images.bone;
+    back.bone_changed = true;
+    if (!back.structures_changed && images.structures) {
+      back.structures = images.structures;
+      back.structures_changed = true;
+    }
+    again.given.insert("edits");
+    if (const auto lower = threshold_of(edits->recipe)) {
+      prepare.lower = *lower;
+      again.given.insert("lower");
+    }
+  }
   const TemporaryFolder scratch;
   if (back.structures_changed) {
     again.given.insert("structures");
