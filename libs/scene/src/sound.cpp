@@ -6,6 +6,7 @@
 #include <string>
 
 #include "osteo/base/error.h"
+#include "osteo/base/portable_math.h"
 #include "osteo/bone/instrument.h"
 #include "osteo/sound/wav.h"
 
@@ -194,7 +195,7 @@ SoundFileFacts write_session_sound(const SessionReader& session, const std::set<
     return true;
   });
   facts.seconds = static_cast<double>(samples_made) / Synthesizer::kRateHz;
-  if (loudest > 0) facts.loudest_db = 20 * std::log10(loudest);
+  if (loudest > 0) facts.loudest_db = 20 * portable::log(loudest) / portable::log(10);
   return facts;
 }
 

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <memory>
 #include <random>
 
 #include "osteo/bone/live_surface.h"
@@ -226,6 +227,31 @@ TEST(ShadingField, LocalUpdatesEqualARebuildToTheBit) {
           ASSERT_TRUE(x[i].index == y[i].index && x[i].normal == y[i].normal) << "brick " << b << ", " << h << " mm";
       }
     }
+  }
+}
+
+TEST(ShadingField, FollowsToAnotherGridOfTheSameBricks) {
+  auto bone = std::make_unique<BrickGrid>(grid_of(0.5, 10));
+  fill(*bone, [&](Vec3 p) { return 0.5 - (length(p) - 7) / 0.5; });
+  LiveSurface live = shaded(*bone);
+  auto next = std::make_unique<BrickGrid>(*bone);
+  for (VoxelKey v = 0; v < next->brick_count() * 512; ++v) {
+    const Ijk c = next->coordinate(v);
+    if (length(next->frame().world_from_index({double(c.i), double(c.j), double(c.k)}) - Vec3{7, 0, 0}) > 2) continue;
+    next->set(v, 0);
+    live.mark(v);
+  }
+  live.rebind(*next);
+  // What it was made from is gone, and where it was holds something else.
+  for (VoxelKey v = 0; v < bone->brick_count() * 512; ++v) bone->set(v, 0.7F);
+  bone.reset();
+  live.update();
+  live.settle();
+  const LiveSurface again = shaded(*next);
+  for (std::uint32_t b = 0; b < next->brick_count(); ++b) {
+    const auto &x = live.patch(b).vertices, &y = again.patch(b).vertices;
+    ASSERT_EQ(x.size(), y.size());
+    for (std::size_t i = 0; i < x.size(); ++i) ASSERT_TRUE(x[i].normal == y[i].normal) << "brick " << b;
   }
 }
 

@@ -173,10 +173,23 @@ TEST(World, APieceIsSplitAgainAndSawnWhereItLies) {
 // What the follower keeps of a piece, made from what it knew of the whole, is what it would be made anew.
 TEST(World, LabelsAndSurfaceOfAPieceEqualNewOnes) {
   const auto surface_of = [](const BrickGrid& b) { return surface_hash(surface_nets(b).mesh); };
+  const auto lit_as_if_new = [](LiveSurface& s) {
+    s.settle();
+    LiveSurface fresh(s.bone(), {});
+    fresh.shade({});
+    for (std::uint32_t b = 0; b < s.bone().brick_count(); ++b) {
+      const auto &x = s.patch(b).vertices, &y = fresh.patch(b).vertices;
+      for (std::size_t v = 0; v < std::min(x.size(), y.size()); ++v) {
+        if (x[v].normal != y[v].normal) return false;
+      }
+    }
+    return true;
+  };
   for (const double turn : {0.0, 0.6}) {
     World w(bar(0.25, turn));
     LiveComponents labels(w.bodies()[0].body->bone);
     LiveSurface surface(w.bodies()[0].body->bone, {});
+    surface.shade({});
     for (const double x : {-7.0, 6.0}) {
       const std::shared_ptr<Body> before = w.bodies()[0].body;
       auto e = w.act(SceneAction::saw({{x, 0, 0}, {1, 0.2, 0}, {0, 0, 1}, 0.8}));
@@ -201,9 +214,11 @@ TEST(World, LabelsAndSurfaceOfAPieceEqualNewOnes) {
       const LiveComponents piece_labels(piece, labels, e.made[0].origin), again(piece);
       ASSERT_EQ(piece_labels.components().size(), again.components().size());
       for (VoxelKey v = 0; v < piece.brick_count() * 512; ++v) ASSERT_EQ(piece_labels.component_of(v), again.component_of(v));
-      const LiveSurface piece_surface(piece, surface, e.made[0].origin);
+      LiveSurface piece_surface(piece, surface, e.made[0].origin);
       EXPECT_EQ(surface_hash(piece_surface.joined().mesh), surface_of(piece));
+      EXPECT_TRUE(lit_as_if_new(piece_surface));
       follow();
+      EXPECT_TRUE(lit_as_if_new(surface));
       EXPECT_EQ(surface_hash(surface.joined().mesh), surface_of(w.bodies()[0].body->bone));
       EXPECT_EQ(labels.components().size(), 1u);
     }

@@ -25,7 +25,10 @@ class LiveSurface {
   /// From now on with the normals of a ShadingField, not of the triangles: for whoever draws it. Pieces of it too.
   void shade(const Context& context);
   /// From now on reads another grid of the same bricks; mark what differs.
-  void rebind(const BrickGrid& bone) { bone_ = &bone; }
+  void rebind(const BrickGrid& bone) {
+    bone_ = &bone;
+    if (shading_) shading_->rebind(bone);
+  }
 
   /// Notes that a voxel changed. O(1).
   void mark(VoxelKey voxel);
