@@ -8,6 +8,7 @@
 #include "osteo/image/structures.h"
 #include "osteo/pipeline/formats.h"
 #include "osteo/scene/case.h"
+#include "osteo/scene/hand_over.h"
 #include "osteo/scene/recipe.h"
 #include "temporal_bone_pipeline.h"
 
@@ -67,8 +68,8 @@ class InMemory {
   std::map<std::string, std::vector<Data>> done_;
 };
 
-fs::path found(const std::string& hash, const std::string& what, const std::string& advice) {
-  if (const auto path = recall_file(hash)) return *path;
+fs::path found(const std::optional<fs::path>& path, const std::string& what, const std::string& advice) {
+  if (path) return *path;
   throw Error(ExitCode::no_input, what + " is not known here, or was moved or changed: a case does not hold its name", advice);
 }
 
@@ -87,7 +88,7 @@ CaseScan open_case_scan(const fs::path& folder, const std::string& scan, const R
   }
   CaseScan result;
   if (scan.empty()) {
-    result.scan = found(recipe->source_hash, "the scan of '" + folder.string() + "'", "give it: osteo edit CASE --scan SCAN");
+    result.scan = found(recall_file(recipe->source_hash), "the scan of '" + folder.string() + "'", "give it: osteo edit CASE --scan SCAN");
   } else {
     require_readable(scan);
     if (hash_path(scan) != recipe->source_hash)
@@ -97,7 +98,8 @@ CaseScan open_case_scan(const fs::path& folder, const std::string& scan, const R
   }
   std::string text(kTemporalBonePipeline);
   if (!recipe->pipeline_hash.empty())
-    text = read_text(found(recipe->pipeline_hash, "the pipeline file of the case", "prepare the case again, with --pipeline"));
+    text = read_text(
+        found(pipeline_file(folder, recipe->pipeline_hash), "the pipeline file of the case", "prepare the case again, with --pipeline"));
   std::map<std::string, std::string> settings = recipe->settings;
   settings.erase("names");
   settings["source"] = result.scan.string();

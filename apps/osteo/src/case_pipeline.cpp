@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/io/volume_io.h"
 
 namespace osteo {
 namespace {
@@ -106,9 +107,10 @@ ScanKeeper::ScanKeeper(const Pipeline& pipeline) {
   for (const PipelineNode& n : pipeline.nodes) {
     const auto image = n.inputs.find("image"), mask = n.inputs.find("mask");
     if (n.stage != "resample" || image == n.inputs.end() || mask == n.inputs.end()) continue;
-    if (image->second.node.empty() || mask->second.node.empty()) continue;
+    if (image->second.node.empty()) continue;
     image_ = {image->second.node, image->second.port};
     mask_ = {mask->second.node, mask->second.port};
+    mask_file_ = mask->second.file;
     return;
   }
 }
@@ -124,6 +126,7 @@ std::function<void(const std::string&, const std::string&, const Data&)> ScanKee
 }
 
 std::optional<CaseScan> ScanKeeper::take() {
+  if (ct_ && !labels_ && !mask_file_.empty()) labels_ = load_labels(mask_file_);
   if (!ct_ || !labels_) return std::nullopt;
   CaseScan scan{std::move(*ct_), std::move(*labels_)};
   ct_.reset();

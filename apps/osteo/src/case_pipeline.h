@@ -39,6 +39,7 @@ class ScanKeeper {
 
  private:
   std::pair<std::string, std::string> image_, mask_;  // node, port
+  std::filesystem::path mask_file_;                   // where no node makes it, as after a correction in another program
   std::optional<Image> ct_;
   std::optional<Labels> labels_;
 };

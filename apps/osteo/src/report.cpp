@@ -8,6 +8,7 @@
 #include "osteo/base/json_document.h"
 #include "osteo/scene/approval.h"
 #include "osteo/scene/case.h"
+#include "osteo/scene/hand_over.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {
@@ -32,7 +33,7 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
   }
   std::string text(kTemporalBonePipeline);
   if (!recipe->pipeline_hash.empty()) {
-    const auto known = recall_file(recipe->pipeline_hash);
+    const auto known = pipeline_file(folder, recipe->pipeline_hash);
     if (!known) return std::nullopt;
     text = read_text(*known);
   }
