@@ -19,6 +19,7 @@
 #include "edit_panel.h"
 #include "edit_scene.h"
 #include "edit_state.h"
+#include "open_window.h"
 #include "osteo/base/error.h"
 #include "osteo/edit/edit_file.h"
 
@@ -97,25 +98,8 @@ class EditWindow {
   }
 
   void open(const EditWindowOptions& options) {
-    static std::string reason;
-    glfwSetErrorCallback([](int, const char* text) { reason = text; });
-    if (glfwInit() == GLFW_FALSE)
-      throw Error(ExitCode::failed, "no window can be opened: " + reason,
-                  "is there a display? Without one: osteo edit CASE --apply edits.json");
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
-    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    int width = options.width, height = options.height, x = 0, y = 0, screen_width = 0, screen_height = 0;
-    if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
-    if (screen_width > 0) width = std::min(width, screen_width);
-    if (screen_height > 0) height = std::min(height, screen_height);
-    window_ = glfwCreateWindow(width, height, options.title.c_str(), nullptr, nullptr);
-    if (window_ == nullptr) {
-      glfwTerminate();
-      throw Error(ExitCode::failed, "no window can be opened: " + reason, "OpenGL 3.2 is needed");
-    }
-    glfwMakeContextCurrent(window_);
-    glfwSwapInterval(1);
+    window_ =
+        open_window(options.title, options.width, options.height, "is there a display? Without one: osteo edit CASE --apply edits.json");
     glfwSetWindowUserPointer(window_, this);
     // ImGui chains these behind its own. Events, not states: at few pictures a second a click begins and ends between two of them.
     using K = Event::Kind;

@@ -32,6 +32,7 @@
 #include "cuts_panel.h"
 #include "gamepad.h"
 #include "help_panel.h"
+#include "open_window.h"
 #include "osteo/base/error.h"
 #include "osteo/grid/brick_places.h"
 #include "osteo/io/surface_io.h"
@@ -99,25 +100,7 @@ class RehearsalWindow {
   // --- set-up -----------------------------------------------------------------------------------------------------
 
   void open(const WindowOptions& options) {
-    static std::string reason;
-    glfwSetErrorCallback([](int, const char* text) { reason = text; });
-    if (glfwInit() == GLFW_FALSE)
-      throw Error(ExitCode::failed, "no window can be opened: " + reason,
-                  "is there a display? Without one: osteo rehearse CASE --headless");
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
-    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    int width = options.width, height = options.height, x = 0, y = 0, screen_width = 0, screen_height = 0;
-    if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
-    if (screen_width > 0) width = std::min(width, screen_width);
-    if (screen_height > 0) height = std::min(height, screen_height);
-    window_ = glfwCreateWindow(width, height, options.title.c_str(), nullptr, nullptr);
-    if (window_ == nullptr) {
-      glfwTerminate();
-      throw Error(ExitCode::failed, "no window can be opened: " + reason, "OpenGL 3.2 is needed");
-    }
-    glfwMakeContextCurrent(window_);
-    glfwSwapInterval(1);
+    window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless");
 
     render_window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
     render_window_->SetOwnContext(0);

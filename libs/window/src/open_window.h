@@ -1,0 +1,13 @@
+// A window with an OpenGL 3.2 context. Private to libs/window.
+#pragma once
+#include <string>
+
+struct GLFWwindow;
+
+namespace osteo {
+
+/// Of so many pixels, less where the screen has less; its context is current, pictures wait for the screen. Error(failed), with the reason,
+/// when none can be opened; `without_display`: what to do on a machine that has no display.
+[[nodiscard]] GLFWwindow* open_window(const std::string& title, int width, int height, const std::string& without_display);
+
+}  // namespace osteo
