@@ -71,7 +71,7 @@ void mark(const Slice& s, Point a, Point b, int reach_u, int reach_v, std::vecto
   }
 }
 
-// Of each pixel the squared distance to the outline, up to the reach.
+// Of each pixel the squared distance to the outline, up to the reach; below zero where there is no bone.
 void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
   square.assign(static_cast<std::size_t>(s.nu) * static_cast<std::size_t>(s.nv), reach_mm * reach_mm);
   const int reach_u = static_cast<int>(std::ceil(reach_mm / s.hu)), reach_v = static_cast<int>(std::ceil(reach_mm / s.hv));
@@ -100,6 +100,12 @@ void measure(const Slice& s, float reach_mm, std::vector<float>& square) {
         if (cut[i]) ends[n++] = i;
       }
       piece(ends[0], ends[1]);
+    }
+  }
+  for (int v = 0; v < s.nv; ++v) {
+    for (int u = 0; u < s.nu; ++u) {
+      float& x = square[static_cast<std::size_t>(v) * static_cast<std::size_t>(s.nu) + static_cast<std::size_t>(u)];
+      x = std::copysign(x, bone(s.at(u, v)) ? 1.0F : -1.0F);
     }
   }
 }
@@ -153,15 +159,14 @@ void limit_by_outlines(std::vector<float>& field, const Frame& f, std::size_t ax
           for (std::size_t a = 0; a < nu; ++a) {
             float& x = field[k * stride[axis] + a * stride[u] + b * stride[v]];
             const std::size_t pixel = b * nu + a;
-            const float distance = std::sqrt(own[pixel]), most = slope * distance;
+            const float distance = std::sqrt(std::abs(own[pixel])), most = slope * distance;
             if (std::abs(x) <= most) continue;
             float share = 1;
-            // Signs do not change, so it does not matter whether a neighbour has been limited already.
             for (const std::size_t other : {k - 1, k + 1}) {
               if (other >= nk) continue;  // k - 1 of the first slice wraps round
-              const float y = field[other * stride[axis] + a * stride[u] + b * stride[v]];
-              if (bone(x) == bone(y)) continue;
-              share = std::min(share, of_one_slope(distance + std::sqrt(of(other)[pixel]), slice_mm, reach_mm));
+              const float there = of(other)[pixel];
+              if (std::signbit(own[pixel]) == std::signbit(there)) continue;
+              share = std::min(share, of_one_slope(distance + std::sqrt(std::abs(there)), slice_mm, reach_mm));
             }
             const float limited = std::clamp(x, -most, most);
             x = share * limited + (1 - share) * x;

@@ -42,7 +42,8 @@ TEST(Stream, ReadersJoinAndLeaveAThousandTimesAndNobodyElseLosesAnything) {
   std::thread servo([&] {
     std::array<VoxelChange, 8> changes;
     for (std::uint64_t t = 0; !stop; ++t) {
-      while (!stop && stays.ticks.room() < 2) std::this_thread::yield();  // so that nothing may be lost
+      // So that nothing may be lost, of neither ring: who follows ticks without a pause looks at no action meanwhile.
+      while (!stop && (stays.ticks.room() < 2 || stays.actions.room() < 2)) std::this_thread::yield();
       if (t % 3 == 0) {
         SceneAction a = SceneAction::plain(ActionKind::undo);
         a.tick = t;
