@@ -244,7 +244,8 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     } else {
       s = r.run_to_end({});
     }
-    EXPECT_GT(s.removed_mm3, 2);
+    // By the clock nothing is removed while a scene is prepared, on a busy machine for the length of whole holes.
+    EXPECT_GT(s.removed_mm3, by_the_clock ? 0.0 : 2.0);
     EXPECT_EQ(s.bone_hash, world.hash()) << "all of it was taken back, to the bit";
     EXPECT_EQ(s.surface_hash, SurfaceReader(world, {}).hash());
     EXPECT_EQ(s.bodies, 1u);
@@ -253,7 +254,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     const Session session = read_session(o.session_file);
     std::size_t strokes = 0;
     for (const RecordedAction& a : session.actions) strokes += a.action.is(ActionKind::stroke) ? 1 : 0;
-    EXPECT_GE(strokes, 4u);
+    EXPECT_GE(strokes, by_the_clock ? 1u : 4u);
     const ReplayResult again = replay(SessionReader(o.session_file), world.copy(), {}, {});
     EXPECT_TRUE(again.identical) << again.difference << (by_the_clock ? " by the clock" : "");
     EXPECT_EQ(again.bone_hash, s.bone_hash);
