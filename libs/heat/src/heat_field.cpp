@@ -117,8 +117,7 @@ void HeatField::for_ball(const Ball& ball, bool make_bricks, F&& f) {
 
 double HeatField::add(const Ball& where, double joules) {
   if (!std::isfinite(joules) || joules == 0) return 0;
-  double capacity = 0;
-  for_ball(where, true, [&](Brick& b, int c, Ijk) { capacity += static_cast<double>(b.capacity[static_cast<std::size_t>(c)]); });
+  const double capacity = holds(where);
   if (!(capacity > 0)) return 0;
   for_ball(where, true, [&](Brick& b, int c, Ijk) {
     b.source[static_cast<std::size_t>(c)] += joules * static_cast<double>(b.capacity[static_cast<std::size_t>(c)]) / capacity;
@@ -126,6 +125,12 @@ double HeatField::add(const Ball& where, double joules) {
   });
   ledger_.added_j += joules;
   return joules;
+}
+
+double HeatField::holds(const Ball& where) {
+  double capacity = 0;
+  for_ball(where, true, [&](Brick& b, int c, Ijk) { capacity += static_cast<double>(b.capacity[static_cast<std::size_t>(c)]); });
+  return capacity;
 }
 
 void HeatField::cool(const Ball& where, double film_w_per_m2_k, double water_k) {
@@ -321,6 +326,16 @@ double HeatField::stored_j() const {
   return sum;
 }
 
+double HeatField::hottest() const {
+  double most = 0;
+  for (const auto& [key, b] : bricks_) {
+    for (std::size_t c = 0; c < kCells; ++c) {
+      if (b->share[c] >= 0.5F) most = std::max(most, b->kelvin[c]);
+    }
+  }
+  return most;
+}
+
 double HeatField::at(Ijk cell) const noexcept {
   const Brick* const b = find(brick_of(cell));
   return b == nullptr ? 0 : b->kelvin[static_cast<std::size_t>(place_of(cell))];
@@ -342,13 +357,15 @@ double HeatField::at(Vec3 where) const noexcept {
   return weights > 0 ? sum / weights : 0;
 }
 
-void HeatField::for_each(const std::function<void(Ijk, double)>& f) const {
-  for (const auto& [key, b] : bricks_) {
-    for (int c = 0; c < kCells; ++c) {
-      if (b->capacity[static_cast<std::size_t>(c)] > 0)
-        f({b->at.i * 8 + (c & 7), b->at.j * 8 + (c >> 3 & 7), b->at.k * 8 + (c >> 6)}, b->kelvin[static_cast<std::size_t>(c)]);
-    }
-  }
+std::vector<Ijk> HeatField::warm_bricks() const {
+  std::vector<Ijk> all;
+  for (const auto& [key, b] : bricks_) all.push_back(b->at);
+  return all;
+}
+
+std::span<const double> HeatField::brick(Ijk at) const {
+  const Brick* const b = find(at);
+  return b == nullptr ? std::span<const double>() : std::span<const double>(b->kelvin);
 }
 
 }  // namespace osteo

@@ -52,6 +52,9 @@ class HeatField {
   /// Heat that comes evenly during the next step(), into the cells of a ball, to each by what it holds. Returns what found matter: nothing
   /// where there is none.
   double add(const Ball& where, double joules);
+  /// What the cells of a ball hold, J/K.
+  [[nodiscard]] double holds(const Ball& where);
+  [[nodiscard]] double full_cell_j_per_k() const { return bone_j_per_k_; }
   /// Water on the open faces within a ball, for the next step() only; between a cell's centre and its face lies bone. Colder or warmer than
   /// the body it makes bricks there.
   void cool(const Ball& where, double film_w_per_m2_k, double water_k);
@@ -66,12 +69,16 @@ class HeatField {
   [[nodiscard]] double at(Vec3 where) const noexcept;
   [[nodiscard]] const HeatLedger& ledger() const { return ledger_; }
   [[nodiscard]] double stored_j() const;
+  /// The highest of cells that are at least half matter: a crumb of a cell gets as hot as the chip that it will be.
+  [[nodiscard]] double hottest() const;
   [[nodiscard]] std::size_t bricks() const { return bricks_.size(); }
   [[nodiscard]] double cell_mm() const { return cell_mm_; }
   /// The longest step that is stable with a film so strong, s.
   [[nodiscard]] double longest_step_s(double film_w_per_m2_k) const;
-  /// Calls f(cell, kelvin) for all cells of matter in bricks that are kept, brick by brick in order.
-  void for_each(const std::function<void(Ijk, double)>& f) const;
+  /// Bricks (cells / 8) that are kept, in a fixed order.
+  [[nodiscard]] std::vector<Ijk> warm_bricks() const;
+  /// The 512 temperatures of a kept brick, x fastest; 0 in air. Until the next call that changes anything.
+  [[nodiscard]] std::span<const double> brick(Ijk at) const;
 
   static constexpr double kLeastK = 1e-3;
 
