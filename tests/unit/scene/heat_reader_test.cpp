@@ -1,0 +1,106 @@
+// Heat of a rehearsal: the same live and in a replay, in balance, less with water, nothing without a burr.
+#include "osteo/scene/heat_reader.h"
+
+#include <gtest/gtest.h>
+
+#include "bar.h"
+#include "osteo/scene/rehearsal.h"
+#include "osteo/session/session_reader.h"
+#include "scratch.h"
+
+namespace osteo {
+namespace {
+
+// A hole in the bar's upper face (z = 4), drilled for three seconds.
+Script hole(bool pedal) {
+  Script s;
+  s.axis = {0, 0.3, 0.95};
+  s.waypoints.push_back({0, {-5, 0, 8}, pedal});
+  s.waypoints.push_back({0.1, {-5, 0, 5.6}, pedal});
+  s.waypoints.push_back({3.0, {-3, 0.5, 4.6}, pedal});
+  s.waypoints.push_back({3.2, {-3, 0.5, 9}, false});
+  s.waypoints.push_back({4.0, {-3, 0.5, 9}, false});
+  return s;
+}
+
+SceneAction at(std::uint64_t tick, SceneAction a) {
+  a.tick = tick;
+  return a;
+}
+
+struct Heated {
+  double peak_c = 0, added_j = 0, balance_j = 0, cooled_j = 0, below_c = 0;
+  std::size_t bricks = 0;
+  std::uint64_t restarts = 0;
+  friend bool operator==(const Heated&, const Heated&) = default;
+};
+Heated told(const HeatReader& h) {
+  const HeatLedger l = h.ledger();
+  return {
+      h.hottest_c(),   l.added_j,   l.added_j - l.chips_j - l.cooled_j - l.forgotten_j - h.stored_j(), l.cooled_j, h.celsius_at({-4, 0, 2}),
+      h.warm_bricks(), h.restarts()};
+}
+
+struct Drilled {
+  Heated live, again;
+};
+Drilled run(bool pedal, std::vector<SceneAction> actions, int tool) {
+  const test::ScratchFolder scratch;
+  const World world(test::bar(0.5, 0.2));
+  RehearsalOptions o;
+  o.session_file = scratch / "heat.oss";
+  o.follow = {true, true, false};
+  o.haptics.device = SpringHand::traits();
+  o.actions = std::move(actions);
+  Script script = hole(pedal);
+  script.tool = tool;
+  Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(script, 1000), o, {});
+  HeatReader live(world, nullptr, 1000), again(world, nullptr, 1000);
+  r.add_reader(live);
+  static_cast<void>(r.run_to_end({}));
+  std::vector<Reader*> readers{&again};
+  EXPECT_TRUE(replay(SessionReader(o.session_file), world.copy(), {}, {}, readers).identical);
+  return {told(live), told(again)};
+}
+
+TEST(HeatReader, IsInBalanceAndTheSameInAReplay) {
+  const int cutting = burr_index(BurrKind::cutting, 4), diamond = burr_index(BurrKind::diamond, 4);
+  const Drilled dry = run(true, {}, diamond);
+  EXPECT_GT(dry.live.peak_c, 40);
+  EXPECT_LT(dry.live.peak_c, 400);
+  EXPECT_GT(dry.live.below_c, 37.05);
+  EXPECT_GT(dry.live.added_j, 0.1);
+  EXPECT_NEAR(dry.live.balance_j, 0, 1e-6 * dry.live.added_j);
+  EXPECT_GT(dry.live.bricks, 0u);
+  // Both began with resync(): told of the bone as it was.
+  EXPECT_EQ(dry.live, dry.again);
+  const Drilled wet = run(true, {at(10, SceneAction::irrigate({-4, 0, 5}, 6, 1))}, diamond);
+  EXPECT_LT(wet.live.peak_c, dry.live.peak_c);
+  EXPECT_GT(wet.live.cooled_j, 0.01);
+  EXPECT_NEAR(wet.live.balance_j, 0, 1e-6 * (wet.live.added_j + wet.live.cooled_j));
+  const Drilled steel = run(true, {}, cutting);
+  EXPECT_GT(steel.live.added_j, 0);
+  EXPECT_LT(steel.live.peak_c, dry.live.peak_c) << "a cutting burr is the cooler one";
+  EXPECT_EQ(steel.live, steel.again);
+}
+
+TEST(HeatReader, ABurrThatStandsHeatsNothing) {
+  const Drilled idle = run(false, {}, 0);
+  EXPECT_EQ(idle.live.added_j, 0);
+  EXPECT_EQ(idle.live.bricks, 0u);
+  EXPECT_EQ(idle.live.peak_c, 37);
+}
+
+// Bone that is cut, taken apart and put together again while it is warm.
+TEST(HeatReader, CutsAndUndo) {
+  const Drilled cut = run(true,
+                          {at(1000, SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1500, SceneAction::split(20)),
+                           at(2200, SceneAction::plain(ActionKind::undo)), at(2300, SceneAction::plain(ActionKind::undo))},
+                          0);
+  EXPECT_EQ(cut.live, cut.again);
+  EXPECT_NEAR(cut.live.balance_j, 0, 1e-6 * cut.live.added_j);
+  EXPECT_GT(cut.live.added_j, 0);
+}
+
+}  // namespace
+}  // namespace osteo
