@@ -1,0 +1,18 @@
+// The distributions, from Boost.Math; its headers are slow to compile, so they are in one file.
+#pragma once
+
+namespace osteo::statistics {
+
+[[nodiscard]] double normal_cdf(double z);
+[[nodiscard]] double normal_quantile(double share);
+/// Two-sided.
+[[nodiscard]] double student_p(double t, double df);
+[[nodiscard]] double student_quantile(double share, double df);
+[[nodiscard]] double chi_squared_quantile(double share, double df);
+[[nodiscard]] double fisher_f_quantile(double share, double df1, double df2);
+/// The non-centrality for which `share` of the non-central t distribution lies below t. NaN where it cannot be found.
+[[nodiscard]] double non_centrality(double t, double df, double share);
+/// Gamma(df / 2) / (sqrt(df / 2) Gamma((df - 1) / 2)): Hedges' factor. df > 1.
+[[nodiscard]] double hedges_factor(double df);
+
+}  // namespace osteo::statistics
