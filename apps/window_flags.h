@@ -67,7 +67,8 @@ struct WindowFlags {
     visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
     visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
     visit({"quality",
-           "how the picture is drawn: plain; calm, with shade in the creases and smooth edges when it rests; deep, always so; auto by measured "
+           "how the picture is drawn: plain; calm, with shade in the creases and smooth edges when it rests; deep, always so; auto by "
+           "measured "
            "time"},
           p.quality);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);

@@ -29,7 +29,9 @@
 namespace osteo {
 namespace {
 
-constexpr int kChunkBricks = 6;  // 48 voxels: an edit renews about 15,000 triangles, a head has about 500 chunks
+// Of a temporal bone chunks of 32 voxels: an edit renews about 5,000 triangles. A head would have too many of them: 48 voxels, 500 chunks.
+constexpr int kChunkBricks = 4, kLargeChunkBricks = 6;
+constexpr std::size_t kLargeFromBricks = 12'000;
 
 }  // namespace
 
@@ -40,12 +42,12 @@ BoneView::~BoneView() {
 void BoneView::show(const LiveSurface& surface) {
   for (const Chunk& c : chunks_) renderer_->RemoveActor(c.actor);
   chunks_.clear();
+  const int edge = surface.bone().brick_count() < kLargeFromBricks ? kChunkBricks : kLargeChunkBricks;
   std::map<std::tuple<int, int, int>, std::uint32_t> index;
   chunk_of_brick_.resize(surface.bone().brick_count());
   for (std::uint32_t b = 0; b < chunk_of_brick_.size(); ++b) {
     const Ijk o = surface.bone().brick_coordinate(b);
-    const auto [it, fresh] =
-        index.try_emplace({o.k / kChunkBricks, o.j / kChunkBricks, o.i / kChunkBricks}, static_cast<std::uint32_t>(chunks_.size()));
+    const auto [it, fresh] = index.try_emplace({o.k / edge, o.j / edge, o.i / edge}, static_cast<std::uint32_t>(chunks_.size()));
     if (fresh) chunks_.emplace_back();
     chunks_[it->second].bricks.push_back(b);
     chunk_of_brick_[b] = it->second;
@@ -278,9 +280,9 @@ std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, st
   meshopt_generateShadowIndexBuffer(joined.data(), whole.data(), whole.size(), points_mm.data(), points, 3 * sizeof(float),
                                     3 * sizeof(float));
   const float scale = meshopt_simplifyScale(points_mm.data(), points, 3 * sizeof(float));
-  const std::size_t kept = meshopt_simplify(coarse.data(), joined.data(), joined.size(), points_mm.data(), points, 3 * sizeof(float),
-                                            whole.size() / 12 * 3, static_cast<float>(error_mm) / std::max(scale, 1e-6F),
-                                            meshopt_SimplifyLockBorder, nullptr);
+  const std::size_t kept =
+      meshopt_simplify(coarse.data(), joined.data(), joined.size(), points_mm.data(), points, 3 * sizeof(float), whole.size() / 12 * 3,
+                       static_cast<float>(error_mm) / std::max(scale, 1e-6F), meshopt_SimplifyLockBorder, nullptr);
   coarse.resize(kept);
   std::vector<std::uint32_t> order(kept);
   meshopt_optimizeVertexCache(order.data(), coarse.data(), kept, points);

@@ -30,9 +30,9 @@ Openness::Openness(const BrickGrid& bone, int threads) {
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     Level& level = levels_[l];
     level.edge_voxels = edge_ << l;
-    for (std::size_t a = 0; a < 3; ++a)
-      level.n[a] = static_cast<int>(std::ceil((most[a] + 1) * 8 / level.edge_voxels));
-    level.cells.assign(static_cast<std::size_t>(level.n[0]) * static_cast<std::size_t>(level.n[1]) * static_cast<std::size_t>(level.n[2]), 0);
+    for (std::size_t a = 0; a < 3; ++a) level.n[a] = static_cast<int>(std::ceil((most[a] + 1) * 8 / level.edge_voxels));
+    level.cells.assign(static_cast<std::size_t>(level.n[0]) * static_cast<std::size_t>(level.n[1]) * static_cast<std::size_t>(level.n[2]),
+                       0);
   }
   parallel_for(bone.brick_count(), 256, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) sum_brick(bone, static_cast<std::uint32_t>(b));

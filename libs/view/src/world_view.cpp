@@ -182,8 +182,9 @@ void WorldView::make_coarse() {
     for (Seen& job : jobs) {
       if (stop_) break;
       auto& a = job.arrays;
-      job.triangles = coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
-                                       {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())}, job.error_mm);
+      job.triangles =
+          coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+                           {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())}, job.error_mm);
     }
     return jobs;
   });

@@ -290,7 +290,8 @@ class RehearsalWindow {
 
   [[nodiscard]] static bool input() {
     const ImGuiIO& io = ImGui::GetIO();
-    return io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyMouseDown() || !io.InputQueueCharacters.empty();
+    return io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyMouseDown() ||
+           !io.InputQueueCharacters.empty();
   }
 
   // While there is nothing else to see.

@@ -86,11 +86,15 @@ void ScenePainter::show() {
   if (draws_) {
     double before[4];
     renderer_->GetViewport(before);
-    renderer_->SetViewport(0, 0, static_cast<double>(width) / turn_.width, static_cast<double>(height) / turn_.height);
+    // VTK clears and copies its window whole: no larger than what is drawn. Others see the window as it is.
+    window_->SetSize(width, height);
+    renderer_->SetViewport(0, 0, 1, 1);
     set_depth(renderer_, style_);
     window_->GetState()->Reset();
     window_->Render();
     renderer_->SetViewport(before);
+    window_->SetSize(turn_.width, turn_.height);
+    stamp_ = seen_ = scene_stamp(renderer_);  // occlusion touches what it draws for the first time
     ++drawn_;
   }
   glBindFramebuffer(GL_FRAMEBUFFER, 0);

@@ -16,13 +16,16 @@ double at(const Openness& o, const BrickGrid& g, Vec3 p, Vec3 n) {
 }
 
 TEST(Openness, IsWholeOnFlatAndBulgingBone) {
-  const auto slab = test::solid(0.5, 12, [](Vec3 p) { return p.z < 0.1; }, {}, 2);
+  const auto slab = test::solid(
+      0.5, 12, [](Vec3 p) { return p.z < 0.1; }, {}, 2);
   const Openness flat(slab);
   for (double x = -6; x < 6; x += 0.37) EXPECT_NEAR(at(flat, slab, {x, 0.5 * x, 0.1}, {0, 0, 1}), 1, 0.03) << x;
-  const auto tilted = test::solid(0.5, 14, [](Vec3 p) { return p.x + p.z < 0; }, {}, 2);
+  const auto tilted = test::solid(
+      0.5, 14, [](Vec3 p) { return p.x + p.z < 0; }, {}, 2);
   const Openness slope(tilted);
   for (double y = -4; y < 4; y += 0.37) EXPECT_NEAR(at(slope, tilted, {0.1 * y, y, -0.1 * y}, normalized({1, 0, 1})), 1, 0.06) << y;
-  const auto ball = test::solid(0.5, 12, [](Vec3 p) { return length(p) < 9; }, {}, 2);
+  const auto ball = test::solid(
+      0.5, 12, [](Vec3 p) { return length(p) < 9; }, {}, 2);
   const Openness round(ball);
   for (double a = 0; a < 6; a += 0.3) {
     const Vec3 n = normalized({std::cos(a), std::sin(a), 0.4 * std::sin(3 * a)});
@@ -43,7 +46,9 @@ TEST(Openness, AtTheBottomOfHolesIsNearTheExactShare) {
       const double found = at(open, bone, {0, 0, 2 - depth}, {0, 0, 1});
       std::printf("voxel %.1f radius %.1f depth %.1f: exact %.2f found %.2f\n", voxel, radius, depth, exact, found);
       worst = std::max(worst, std::abs(found - exact));
-      if (depth > radius) EXPECT_LT(found, 0.35);
+      if (depth > radius) {
+        EXPECT_LT(found, 0.35);
+      }
       EXPECT_GT(at(open, bone, {radius + 1.5, 0, 2}, {0, 0, 1}), 0.95);  // the rim
     }
   }
@@ -52,7 +57,8 @@ TEST(Openness, AtTheBottomOfHolesIsNearTheExactShare) {
 }
 
 TEST(Openness, RenewedIsAsMadeAnew) {
-  auto bone = test::solid(0.4, 8, [](Vec3 p) { return p.z < 2; }, {}, 2);
+  auto bone = test::solid(
+      0.4, 8, [](Vec3 p) { return p.z < 2; }, {}, 2);
   Openness live(bone);
   std::vector<std::uint32_t> bricks;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {

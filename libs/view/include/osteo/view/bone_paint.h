@@ -15,8 +15,8 @@ namespace osteo {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-/// Dense bone is ivory. Where the millimetre below the surface is hardly denser than marrow, as on a cut through the diploe, it is redder and
-/// speckled; the speckle belongs to the place, not to the triangles. What is less than kShownThroughMm below shines through in its
+/// Dense bone is ivory. Where the millimetre below the surface is hardly denser than marrow, as on a cut through the diploe, it is redder
+/// and speckled; the speckle belongs to the place, not to the triangles. What is less than kShownThroughMm below shines through in its
 /// structure's colour, the more the thinner the bone is: the bone left above it is measured to the structure's face, so the colour has no
 /// steps. All of it is darker where little light gets in (Openness), but never below kDarkest of itself. Colours are such that under
 /// set_up_scene's lights no channel reaches 250. Not thread-safe while renew() runs.
@@ -39,7 +39,8 @@ class BonePaint {
   Openness openness_;
 };
 
-/// How much of a structure's colour comes through the bone above it, 0 to 1, along the way `inwards` from a point of the surface, and whose.
+/// How much of a structure's colour comes through the bone above it, 0 to 1, along the way `inwards` from a point of the surface, and
+/// whose.
 struct Shine {
   double share = 0;
   std::uint8_t structure = 0;

@@ -98,6 +98,7 @@ class BoneView {
 
 /// At most a quarter of a chunk's triangles, or as few as keep its surface to `error_mm` (as meshoptimizer measures it) and its border to
 /// the last point, on the same points.
-[[nodiscard]] std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles, double error_mm);
+[[nodiscard]] std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles,
+                                                          double error_mm);
 
 }  // namespace osteo

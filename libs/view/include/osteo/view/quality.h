@@ -25,7 +25,8 @@ struct PictureStyle {
 /// Chooses style by times of pictures. A moving picture is to take at most kMovingMs: where three in a row take more, the next has fewer
 /// pixels (of kScales), until eight in a row would take less than 0.8 of that with more. Effects: a resting picture's time tells what they
 /// cost. At or below kDeepMs automatic goes from calm to deep, and back where eight moving pictures in a row take more than kTooDeepMs;
-/// where a resting picture takes more than kTooCalmMs, automatic goes on as plain, until the picture has half as many pixels. Deterministic.
+/// where a resting picture takes more than kTooCalmMs, automatic goes on as plain, until the picture has half as many pixels.
+/// Deterministic.
 class QualityChoice {
  public:
   static constexpr double kMovingMs = 50, kDeepMs = 20, kTooDeepMs = 40, kTooCalmMs = 2500;
