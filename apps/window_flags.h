@@ -4,6 +4,7 @@
 
 #include "osteo/bone/burr.h"
 #include "osteo/haptics/contact.h"
+#include "osteo/view/quality.h"
 
 namespace osteo {
 
@@ -39,6 +40,7 @@ struct WindowFlags {
   double volume = 0.7;
   bool alarms = false;
   bool require_approved = false;
+  Quality quality = Quality::automatic;
   int width = 1360;
   int height = 860;
   std::string state_file;
@@ -64,6 +66,11 @@ struct WindowFlags {
     visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);
     visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
     visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
+    visit({"quality",
+           "how the picture is drawn: plain; calm, with shade in the creases and smooth edges when it rests; deep, always so; auto by "
+           "measured "
+           "time"},
+          p.quality);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);

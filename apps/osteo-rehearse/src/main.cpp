@@ -237,6 +237,7 @@ struct WindowCommand {
     window.title = "Osteotome - " + the_case.folder.filename().string();
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
+    window.quality = p.quality;
     window.width = p.width;
     window.height = p.height;
     window.state_file = p.state_file;

@@ -8,6 +8,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
+#include "osteo/bone/live_surface.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/io/volume_io.h"
@@ -24,7 +25,7 @@ namespace {
 using namespace case_report;
 
 // Raise it when pictures are drawn otherwise: those of an earlier report are then drawn anew.
-constexpr int kPicturesVersion = 1;
+constexpr int kPicturesVersion = 2;
 
 // Same state, same pictures.
 std::string state_of(const fs::path& folder) {
@@ -48,6 +49,22 @@ void complete_normals(TriMesh& mesh) {
   }
   mesh.normals.clear();
   for (const Vec3& n : sum) mesh.normals.push_back(to_floats(normalized(n)));
+}
+
+// With normals that do not show the CT's slices as terraces, where the surface is that of the case's bone as it is; measures go by the
+// triangles' own.
+std::shared_ptr<const TriMesh> lit_as_in_the_window(std::shared_ptr<const TriMesh> mesh, const BrickGrid& bone, const Context& context) {
+  LiveSurface live(bone, context);
+  live.shade(context);
+  BoneSurface made = live.joined();
+  constexpr double kSameMm = 1e-3;
+  if (made.mesh.points_mm.size() != mesh->points_mm.size()) return mesh;
+  for (std::size_t p = 0; p < made.mesh.points_mm.size(); ++p) {
+    if (length(from_floats(made.mesh.points_mm[p]) - from_floats(mesh->points_mm[p])) > kSameMm) return mesh;
+  }
+  auto lit = std::make_shared<TriMesh>(*mesh);
+  lit->normals = std::move(made.mesh.normals);
+  return lit;
 }
 
 // Everything that is known of a case, read once.
@@ -78,11 +95,13 @@ struct Content {
   }
 
   void draw(const std::optional<CaseScan>& scan, const Context& context) {
+    std::shared_ptr<const TriMesh> drawn;
     if (const auto it = the_case.files.find("surface"); it != the_case.files.end()) {
       auto mesh = std::make_shared<TriMesh>(*load_surface(it->second));
       complete_normals(*mesh);
       surface = mesh;
-      subject.surface = mesh.get();
+      drawn = lit_as_in_the_window(mesh, *bone, context);
+      subject.surface = drawn.get();
     }
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
     if (hu) subject.hu = &*hu;

@@ -4,7 +4,7 @@
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
-#include <vtkLightKit.h>
+#include <vtkLight.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
@@ -13,6 +13,7 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -29,18 +30,24 @@ vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data) {
   actor->SetMapper(mapper);
   vtkProperty* const p = actor->GetProperty();
   p->SetColor(0.93, 0.88, 0.77);
-  p->SetAmbient(0.08);
-  p->SetDiffuse(0.95);
-  p->SetSpecular(0.12);
-  p->SetSpecularPower(25);
+  p->SetAmbient(kBoneAmbient);
+  set_bone_wetness(p, 0);
   return actor;
+}
+
+void set_bone_wetness(vtkProperty* p, double share) {
+  const double wet = std::clamp(share, 0.0, 1.0);
+  p->SetDiffuse(0.82 - 0.14 * wet);
+  p->SetSpecular(0.05 + 0.13 * wet);
+  p->SetSpecularPower(20 + 60 * wet);
 }
 
 vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh) {
   auto actor = make_bone_actor(to_vtk(mesh));
   vtkProperty* const p = actor->GetProperty();
   p->SetColor(0.62, 0.66, 0.74);
-  p->SetSpecular(0.55);
+  p->SetDiffuse(0.72);
+  p->SetSpecular(0.32);
   p->SetSpecularPower(30);
   return actor;
 }
@@ -51,7 +58,6 @@ void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& t) {
     for (int c = 0; c < 3; ++c) matrix->SetElement(r, c, t.rotation.column[static_cast<std::size_t>(c)][a]);
     matrix->SetElement(r, 3, t.shift_mm[a]);
   }
-  matrix->Modified();
 }
 
 vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {
@@ -88,17 +94,39 @@ vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape) {
 }
 
 void set_up_scene(vtkRenderer* renderer) {
-  renderer->SetBackground(0.06, 0.08, 0.11);
-  renderer->SetBackground2(0.16, 0.20, 0.26);
-  renderer->GradientBackgroundOn();
+  // Of one colour: occlusion draws over a gradient.
+  renderer->SetBackground(0.09, 0.115, 0.15);
+  renderer->GradientBackgroundOff();
   renderer->AutomaticLightCreationOff();
   renderer->RemoveAllLights();
-  vtkNew<vtkLightKit> lights;
-  lights->SetKeyLightIntensity(0.8);
-  lights->SetKeyToFillRatio(2.2);
-  lights->SetKeyToHeadRatio(1.6);
-  lights->SetKeyLightAngle(35, -25);
-  lights->AddLightsToRenderer(renderer);
+  const auto lamp = [&](double x, double y, double intensity, double r, double g, double b) {
+    vtkNew<vtkLight> light;
+    light->SetLightTypeToCameraLight();
+    light->SetPosition(x, y, 1);
+    light->SetFocalPoint(0, 0, 0);
+    light->SetIntensity(intensity);
+    light->SetColor(r, g, b);
+    renderer->AddLight(light);
+  };
+  lamp(-0.26, 0.34, 0.88, 1, 0.985, 0.96);
+  lamp(0.9, -0.7, 0.25, 0.92, 0.96, 1);
+}
+
+double seen_height_mm(vtkRenderer* renderer) {
+  vtkCamera* const camera = renderer->GetActiveCamera();
+  if (camera->GetParallelProjection() != 0) return 2 * camera->GetParallelScale();
+  return 2 * camera->GetDistance() * std::tan(camera->GetViewAngle() * std::numbers::pi / 360);
+}
+
+void set_depth(vtkRenderer* renderer, const PictureStyle& style) {
+  renderer->SetUseSSAO(style.effects);
+  renderer->SetUseFXAA(style.effects);
+  if (!style.effects) return;
+  const double radius_mm = std::clamp(0.035 * seen_height_mm(renderer), 0.5, 8.0);
+  renderer->SetSSAORadius(radius_mm);
+  renderer->SetSSAOBias(0.03 * radius_mm);
+  renderer->SetSSAOKernelSize(32);
+  renderer->SetSSAOBlur(true);
 }
 
 void look_at(vtkRenderer* renderer, Vec3 centre, double radius_mm, Vec3 eye) {

@@ -14,34 +14,24 @@
 #include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <meshoptimizer.h>
+
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <set>
 #include <tuple>
 
+#include "osteo/base/parallel.h"
 #include "osteo/view/actors.h"
 
 namespace osteo {
 namespace {
 
-constexpr int kChunkBricks = 6;  // 48 voxels: an edit renews about 15,000 triangles, a head has about 500 chunks
-constexpr double kBone[3] = {0.93, 0.88, 0.77};
-constexpr double kFadeMm = 0.8;  // bone this thick lets a third of the colour below through (a guess: what drilled bone looks like)
-
-// Bone, or what lies a little below it.
-void colour_at(const StructureMap& structures, Vec3 p, Vec3 outwards, unsigned char* rgb) {
-  double share = 0;
-  std::array<double, 3> below{};
-  if (const auto near = structures.at(p); near.structure != 0 && near.distance_mm < BoneView::kShownThroughMm) {
-    for (double t = 0; t <= BoneView::kShownThroughMm; t += 0.25) {
-      const auto there = structures.at(p - outwards * t);
-      if (there.structure == 0 || there.distance_mm > 0) continue;
-      share = std::exp(-t / kFadeMm);
-      below = structures.colour_of(there.structure);
-      break;
-    }
-  }
-  for (std::size_t c = 0; c < 3; ++c) rgb[c] = static_cast<unsigned char>(std::lround(255 * (kBone[c] * (1 - share) + below[c] * share)));
-}
+// Of a temporal bone chunks of 32 voxels: an edit renews about 5,000 triangles. A head would have too many of them: 48 voxels, 500 chunks.
+constexpr int kChunkBricks = 4, kLargeChunkBricks = 6;
+constexpr std::size_t kLargeFromBricks = 12'000;
 
 }  // namespace
 
@@ -52,21 +42,29 @@ BoneView::~BoneView() {
 void BoneView::show(const LiveSurface& surface) {
   for (const Chunk& c : chunks_) renderer_->RemoveActor(c.actor);
   chunks_.clear();
+  const int edge = surface.bone().brick_count() < kLargeFromBricks ? kChunkBricks : kLargeChunkBricks;
   std::map<std::tuple<int, int, int>, std::uint32_t> index;
   chunk_of_brick_.resize(surface.bone().brick_count());
   for (std::uint32_t b = 0; b < chunk_of_brick_.size(); ++b) {
     const Ijk o = surface.bone().brick_coordinate(b);
-    const auto [it, fresh] =
-        index.try_emplace({o.k / kChunkBricks, o.j / kChunkBricks, o.i / kChunkBricks}, static_cast<std::uint32_t>(chunks_.size()));
+    const auto [it, fresh] = index.try_emplace({o.k / edge, o.j / edge, o.i / edge}, static_cast<std::uint32_t>(chunks_.size()));
     if (fresh) chunks_.emplace_back();
     chunks_[it->second].bricks.push_back(b);
     chunk_of_brick_[b] = it->second;
   }
+  voxel_mm_ = surface.bone().frame().spacing_mm.x;
+  paint_ = std::make_unique<BonePaint>(surface.bone(), structures_, hardness_);
+  colours_.assign(surface.bone().brick_count(), {});
+  is_updated_.assign(surface.bone().brick_count(), false);
+  updated_.clear();
+  std::vector<std::uint32_t> all(surface.bone().brick_count());
+  std::iota(all.begin(), all.end(), 0U);
+  paint(surface, all);
   for (Chunk& c : chunks_) {
     c.data = vtkSmartPointer<vtkPolyData>::New();
     c.actor = make_bone_actor(c.data);
     c.actor->GetProperty()->BackfaceCullingOn();
-    if (structures_ != nullptr) c.actor->GetMapper()->ScalarVisibilityOn();
+    c.actor->GetMapper()->ScalarVisibilityOn();
     if (matrix_) c.actor->SetUserMatrix(matrix_);
     rebuild(c, surface);
     renderer_->AddActor(c.actor);
@@ -74,9 +72,56 @@ void BoneView::show(const LiveSurface& surface) {
 }
 
 void BoneView::update(const LiveSurface& surface, std::span<const std::uint32_t> bricks) {
+  if (bricks.empty()) return;
+  paint_->renew(surface.bone(), bricks);
+  paint(surface, bricks);
   std::set<std::uint32_t> touched;
-  for (const std::uint32_t b : bricks) touched.insert(chunk_of_brick_[b]);
+  for (const std::uint32_t b : bricks) {
+    touched.insert(chunk_of_brick_[b]);
+    if (is_updated_[b]) continue;
+    is_updated_[b] = true;
+    updated_.push_back(b);
+  }
   for (const std::uint32_t c : touched) rebuild(chunks_[c], surface);
+}
+
+void BoneView::paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks) {
+  // By threads only where it is worth waking them.
+  parallel_for(bricks.size(), bricks.size() > 200 ? 32 : bricks.size() + 1, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) paint_->paint(surface.bone(), surface.patch(bricks[n]), colours_[bricks[n]]);
+  });
+}
+
+void BoneView::refresh(const LiveSurface& surface) {
+  if (updated_.empty()) return;
+  const BrickGrid& bone = surface.bone();
+  const int reach = 1 + static_cast<int>(std::ceil(Openness::kReachMm / (8 * bone.frame().spacing_mm.x)));
+  std::set<std::uint32_t> near, touched;
+  for (const std::uint32_t b : updated_) {
+    is_updated_[b] = false;
+    const Ijk o = bone.brick_coordinate(b);
+    for (int k = o.k - reach; k <= o.k + reach; ++k)
+      for (int j = o.j - reach; j <= o.j + reach; ++j)
+        for (int i = o.i - reach; i <= o.i + reach; ++i)
+          if (const std::uint32_t n = bone.find_brick(i, j, k); n != BrickGrid::kNone && !surface.patch(n).vertices.empty()) near.insert(n);
+  }
+  updated_.clear();
+  paint(surface, std::vector<std::uint32_t>(near.begin(), near.end()));
+  for (const std::uint32_t b : near) touched.insert(chunk_of_brick_[b]);
+  for (const std::uint32_t c : touched) recolour(chunks_[c]);
+}
+
+void BoneView::recolour(Chunk& chunk) {
+  vtkNew<vtkUnsignedCharArray> colours;
+  colours->SetNumberOfComponents(3);
+  colours->SetNumberOfTuples(chunk.data->GetNumberOfPoints());
+  unsigned char* to = colours->GetPointer(0);
+  for (const std::uint32_t b : chunk.bricks) {
+    for (const Rgb& c : colours_[b]) to = std::copy(c.begin(), c.end(), to);
+  }
+  chunk.data->GetPointData()->SetScalars(colours);
+  chunk.data->Modified();
+  chunk.actor->GetMapper()->Update();
 }
 
 void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
@@ -100,7 +145,7 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   const bool mirrored = determinant(frame.direction) < 0;
   vtkNew<vtkUnsignedCharArray> colours;
   colours->SetNumberOfComponents(3);
-  colours->SetNumberOfTuples(structures_ != nullptr ? static_cast<vtkIdType>(points) : 0);
+  colours->SetNumberOfTuples(static_cast<vtkIdType>(points));
   unsigned char* rgb = colours->GetPointer(0);
   int base = 0;
   for (const std::uint32_t b : chunk.bricks) {
@@ -114,11 +159,8 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
         *p++ = static_cast<float>(w[a]);
         *n++ = static_cast<float>(d[a]);
       }
-      if (structures_ != nullptr) {
-        colour_at(*structures_, w, d, rgb);
-        rgb += 3;
-      }
     }
+    for (const Rgb& each : colours_[b]) rgb = std::copy(each.begin(), each.end(), rgb);
     for (const auto& t : patch.triangles) {
       *c++ = base + static_cast<int>(t[0]);
       *c++ = base + static_cast<int>(t[mirrored ? 2 : 1]);
@@ -135,10 +177,12 @@ void BoneView::rebuild(Chunk& chunk, const LiveSurface& surface) {
   chunk.data->SetPoints(vtk_points);
   chunk.data->SetPolys(cells);
   chunk.data->GetPointData()->SetNormals(normals);
-  if (structures_ != nullptr) chunk.data->GetPointData()->SetScalars(colours);
+  chunk.data->GetPointData()->SetScalars(colours);
   chunk.data->Modified();
   chunk.complete = {xyz.Get(), connectivity.Get(), chunk.complete.version + 1};
-  chunk.partly = false;
+  chunk.drawn = Drawn::complete;
+  chunk.drawn_triangles = triangles;
+  ++version_;
   chunk.actor->GetMapper()->Update();
   chunk.actor->SetVisibility(triangles > 0 ? 1 : 0);
 }
@@ -156,27 +200,45 @@ void set_triangles(vtkPolyData* data, vtkTypeInt32Array* connectivity) {
   data->Modified();
 }
 
+vtkSmartPointer<vtkTypeInt32Array> array_of(std::span<const std::uint32_t> triangles) {
+  auto array = vtkSmartPointer<vtkTypeInt32Array>::New();
+  array->SetNumberOfValues(static_cast<vtkIdType>(triangles.size()));
+  std::transform(triangles.begin(), triangles.end(), array->GetPointer(0), [](std::uint32_t v) { return static_cast<int>(v); });
+  return array;
+}
+
 }  // namespace
+
+void BoneView::draw(Chunk& chunk, vtkTypeInt32Array* triangles, Drawn drawn) {
+  set_triangles(chunk.data, triangles);
+  chunk.actor->GetMapper()->Update();
+  chunk.drawn = drawn;
+  chunk.drawn_triangles = static_cast<std::size_t>(triangles->GetNumberOfValues()) / 3;
+  chunk.actor->SetVisibility(chunk.drawn_triangles > 0 ? 1 : 0);
+}
 
 void BoneView::draw_only(std::size_t n, std::uint64_t version, std::span<const std::uint32_t> triangles) {
   Chunk& chunk = chunks_[n];
-  if (chunk.complete.version != version) return;
-  vtkNew<vtkTypeInt32Array> some;
-  some->SetNumberOfValues(static_cast<vtkIdType>(triangles.size()));
-  for (std::size_t i = 0; i < triangles.size(); ++i) some->SetValue(static_cast<vtkIdType>(i), static_cast<int>(triangles[i]));
-  set_triangles(chunk.data, some);
-  chunk.actor->GetMapper()->Update();
-  chunk.actor->SetVisibility(triangles.empty() ? 0 : 1);
-  chunk.partly = true;
+  if (chunk.complete.version == version) draw(chunk, array_of(triangles), Drawn::visible);
 }
 
-void BoneView::draw_all() {
-  for (Chunk& chunk : chunks_) {
-    if (!chunk.partly) continue;
-    set_triangles(chunk.data, chunk.complete.triangles);
-    chunk.actor->GetMapper()->Update();
-    chunk.actor->SetVisibility(chunk.complete.triangles->GetNumberOfValues() > 0 ? 1 : 0);
-    chunk.partly = false;
+void BoneView::keep_coarse(std::size_t n, std::uint64_t version, std::vector<std::uint32_t> triangles) {
+  Chunk& chunk = chunks_[n];
+  if (chunk.complete.version != version) return;
+  chunk.coarse = std::move(triangles);
+  chunk.coarse_version = version;
+}
+
+void BoneView::draw_all(bool coarse) {
+  for (std::size_t n = 0; n < chunks_.size(); ++n) {
+    Chunk& chunk = chunks_[n];
+    const Drawn wanted = coarse && has_coarse(n) ? Drawn::coarse : Drawn::complete;
+    if (chunk.drawn == wanted) continue;
+    if (wanted == Drawn::coarse) {
+      draw(chunk, array_of(chunk.coarse), Drawn::coarse);
+    } else {
+      draw(chunk, chunk.complete.triangles, Drawn::complete);
+    }
   }
 }
 
@@ -191,13 +253,40 @@ void BoneView::place(const RigidTransform& t) {
 }
 
 void BoneView::highlight(bool on) {
-  for (const Chunk& c : chunks_) c.actor->GetProperty()->SetAmbient(on ? 0.3 : 0.08);
+  for (const Chunk& c : chunks_) c.actor->GetProperty()->SetAmbient(on ? kBoneAmbient + 0.2 : kBoneAmbient);
+}
+
+void BoneView::set_wetness(double share) {
+  for (const Chunk& c : chunks_) set_bone_wetness(c.actor->GetProperty(), share);
 }
 
 std::size_t BoneView::triangles() const {
   std::size_t total = 0;
   for (const Chunk& c : chunks_) total += static_cast<std::size_t>(c.complete.triangles->GetNumberOfValues() / 3);
   return total;
+}
+
+std::size_t BoneView::drawn_triangles() const {
+  std::size_t total = 0;
+  for (const Chunk& c : chunks_) total += c.drawn_triangles;
+  return total;
+}
+
+std::vector<std::uint32_t> coarse_triangles(std::span<const float> points_mm, std::span<const int> triangles, double error_mm) {
+  if (triangles.empty()) return {};
+  const std::size_t points = points_mm.size() / 3;
+  std::vector<std::uint32_t> whole(triangles.begin(), triangles.end()), joined(whole.size()), coarse(whole.size());
+  // Bricks have points of their own along their common face.
+  meshopt_generateShadowIndexBuffer(joined.data(), whole.data(), whole.size(), points_mm.data(), points, 3 * sizeof(float),
+                                    3 * sizeof(float));
+  const float scale = meshopt_simplifyScale(points_mm.data(), points, 3 * sizeof(float));
+  const std::size_t kept =
+      meshopt_simplify(coarse.data(), joined.data(), joined.size(), points_mm.data(), points, 3 * sizeof(float), whole.size() / 12 * 3,
+                       static_cast<float>(error_mm) / std::max(scale, 1e-6F), meshopt_SimplifyLockBorder, nullptr);
+  coarse.resize(kept);
+  std::vector<std::uint32_t> order(kept);
+  meshopt_optimizeVertexCache(order.data(), coarse.data(), kept, points);
+  return order;
 }
 
 }  // namespace osteo

@@ -46,7 +46,7 @@ OffscreenWindow::OffscreenWindow(int width, int height) : impl_(std::make_unique
   impl_->window->SetOwnContext(0);
   impl_->window->SetIsCurrent(true);
   impl_->window->SetReadyForRendering(true);
-  impl_->window->SetMultiSamples(4);
+  impl_->window->SetMultiSamples(0);  // in software nearly three times the work; smooth edges: set_depth
   impl_->window->SetSize(width, height);
   {
     // GLEW, built for X, complains that there is no X display after it has loaded every function: harmless.
@@ -58,6 +58,7 @@ OffscreenWindow::OffscreenWindow(int width, int height) : impl_(std::make_unique
 
 OffscreenWindow::~OffscreenWindow() {
   if (!impl_) return;
+  make_current();
   if (impl_->window) {
     impl_->window->Finalize();
     impl_->window = nullptr;
@@ -70,6 +71,14 @@ OffscreenWindow::~OffscreenWindow() {
 
 vtkGenericOpenGLRenderWindow* OffscreenWindow::window() {
   return impl_->window;
+}
+
+void OffscreenWindow::make_current() {
+  eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context);
+}
+
+void OffscreenWindow::finish() {
+  impl_->window->WaitForCompletion();
 }
 
 Picture OffscreenWindow::render() {

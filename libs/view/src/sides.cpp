@@ -70,6 +70,7 @@ std::vector<Picture> draw_sides(const TriMesh& mesh, std::span<const ViewFrom> s
     renderer->GetActiveCamera()->SetParallelProjection(1);
     renderer->GetActiveCamera()->SetParallelScale(0.5 * height * mm_per_pixel);
     renderer->ResetCameraClippingRange();
+    set_depth(renderer, {true, 1});
     pictures.push_back(window.render());
   }
   return pictures;

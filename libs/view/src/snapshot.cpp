@@ -19,6 +19,7 @@
 #include <memory>
 
 #include "osteo/base/error.h"
+#include "osteo/bone/live_surface.h"
 #include "osteo/grid/sampler.h"
 #include "osteo/io/vtk_data.h"
 #include "osteo/mesh/bone_surface.h"
@@ -268,6 +269,13 @@ TriMesh zero_of(const SparseGrid& grid, const Context& context) {
   return surface_nets(bricks, 0.5F, context).mesh;
 }
 
+// As the window shows bone: without the terraces that the triangles' own normals have.
+TriMesh shaded_surface(const BrickGrid& bone, const Context& context) {
+  LiveSurface surface(bone, context);
+  surface.shade(context);
+  return surface.joined().mesh;
+}
+
 vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const SnapshotParams& p, const Context& context) {
   if (const auto* surface = std::get_if<Surface>(&s.surface)) return to_vtk(**surface);
   // Structures are drawn inside the bone, not instead of it.
@@ -279,7 +287,7 @@ vtkSmartPointer<vtkPolyData> surface_of(const SnapshotSubjects& s, const Snapsho
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name == "distance_mm")
       return to_vtk(zero_of(*grid, context));
     if (const auto* grid = std::get_if<SparseGrid>(data); grid != nullptr && grid->name != "hu") {
-      return to_vtk(surface_nets(to_bricks(*grid), 0.5F, context).mesh);
+      return to_vtk(shaded_surface(to_bricks(*grid), context));
     }
     if (const auto* labels = std::get_if<Labels>(data)) return isosurface<std::uint8_t>(*labels, 0.5, 0);
     if (const auto* image = std::get_if<Image>(data)) return isosurface<std::int16_t>(*image, p.bone_hu, -1024);
@@ -371,6 +379,7 @@ Picture snapshot(const SnapshotSubjects& s, const SnapshotParams& p, const Conte
     const Vec3 middle{(b[0] + b[1]) / 2, (b[2] + b[3]) / 2, (b[4] + b[5]) / 2};
     const double radius = 0.5 * length({b[1] - b[0], b[3] - b[2], b[5] - b[4]});
     look_at(renderer, middle, 0.82 * radius, eye_direction(p.view));
+    set_depth(renderer, {true, 1});
     paste(picture, window.render(), p.width - sw, p.height - sh);
     context.report("triangles_drawn", static_cast<std::int64_t>(surface->GetNumberOfCells()));
   } else {

@@ -26,6 +26,12 @@
 #include "osteo/view/visible.h"
 
 namespace osteo {
+namespace {
+
+// So long nothing has happened when what can wait is done.
+constexpr std::chrono::milliseconds kStill{300};
+
+}  // namespace
 
 WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : renderer_(renderer), structures_(structures) {
   if (structures == nullptr) return;
@@ -44,6 +50,8 @@ WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : re
 }
 
 WorldView::~WorldView() {
+  stop_ = true;
+  if (coarsening_.valid()) coarsening_.wait();
   if (looking_.valid()) looking_.wait();
   if (structures_actor_) renderer_->RemoveActor(structures_actor_);
   if (soft_actor_) renderer_->RemoveActor(soft_actor_);
@@ -54,12 +62,13 @@ WorldView::~WorldView() {
 }
 
 void WorldView::update(const World& world, SceneReaders& readers) {
+  const auto now = std::chrono::steady_clock::now();
   std::erase_if(bodies_, [&](const auto& b) { return world.find(b.first) == nullptr; });
   if (readers.surface) {
     // Normals a little way off a cut may follow a quarter of a second later.
     constexpr std::chrono::milliseconds kSettle{250};
     readers.surface->shade();
-    if (const auto now = std::chrono::steady_clock::now(); now >= settle_at_) {
+    if (now >= settle_at_) {
       readers.surface->settle();
       settle_at_ = now + kSettle;
     }
@@ -73,10 +82,15 @@ void WorldView::update(const World& world, SceneReaders& readers) {
     if (!view) {
       // What is at risk goes with the first body, and the finer part of it.
       const bool patient = id == world.bodies().front().body->id || placed.of_region;
-      view = std::make_unique<BoneView>(renderer_, patient ? structures_ : nullptr);
+      view = std::make_unique<BoneView>(renderer_, patient ? structures_ : nullptr, placed.body->hardness);
       view->show(*surface);
-    } else {
+      view->set_wetness(wetness_);
+      changed_at_ = now;
+    } else if (!changed.empty()) {
       view->update(*surface, changed);
+      changed_at_ = now;
+    } else if (now - changed_at_ > kStill) {
+      view->refresh(*surface);
     }
     view->place(placed.world_from_body);
   }
@@ -132,19 +146,59 @@ void WorldView::highlight(std::uint32_t body) {
   for (auto& [id, view] : bodies_) view->highlight(id == body);
 }
 
+void WorldView::set_wetness(double share) {
+  if (share == wetness_) return;
+  wetness_ = share;
+  for (auto& [id, view] : bodies_) view->set_wetness(share);
+}
+
 std::size_t WorldView::triangles() const {
   std::size_t total = 0;
   for (const auto& [id, view] : bodies_) total += view->triangles();
   return total;
 }
 
-void WorldView::wake() {
-  looked_ = false;
-  drawn_ = 0;
-  for (auto& [id, view] : bodies_) view->draw_all();
+std::size_t WorldView::drawn_triangles() const {
+  std::size_t total = 0;
+  for (const auto& [id, view] : bodies_) total += view->drawn_triangles();
+  return total;
 }
 
-void WorldView::rest(int width, int height) {
+void WorldView::wake(bool coarse) {
+  looked_ = false;
+  for (auto& [id, view] : bodies_) view->draw_all(coarse);
+}
+
+// A thread makes the coarse triangles of all chunks that have none, or old ones.
+void WorldView::make_coarse() {
+  std::vector<Seen> jobs;
+  for (const auto& [id, view] : bodies_) {
+    for (std::size_t n = 0; n < view->chunks(); ++n) {
+      if (!view->has_coarse(n)) jobs.push_back({id, n, view->arrays(n), {}, kCoarse * view->voxel_mm()});
+    }
+  }
+  if (jobs.empty()) return;
+  coarsening_ = std::async(std::launch::async, [this, jobs = std::move(jobs)]() mutable {
+    for (Seen& job : jobs) {
+      if (stop_) break;
+      auto& a = job.arrays;
+      job.triangles =
+          coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+                           {a.triangles->GetPointer(0), static_cast<std::size_t>(a.triangles->GetNumberOfValues())}, job.error_mm);
+    }
+    return jobs;
+  });
+}
+
+void WorldView::take_coarse() {
+  if (!coarsening_.valid() || coarsening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  for (Seen& s : coarsening_.get()) {
+    if (const auto body = bodies_.find(s.body); body != bodies_.end() && s.chunk < body->second->chunks())
+      body->second->keep_coarse(s.chunk, s.arrays.version, std::move(s.triangles));
+  }
+}
+
+bool WorldView::rest(int width, int height, bool coarse) {
   // All that decides what is seen; not the clipping planes, which follow the drill.
   vtkCamera* const camera = renderer_->GetActiveCamera();
   std::vector<double> now{static_cast<double>(width), static_cast<double>(height), camera->GetViewAngle()};
@@ -153,12 +207,15 @@ void WorldView::rest(int width, int height) {
     const RigidTransform t = view->placed();
     for (const Vec3 v : {t.rotation.column[0], t.rotation.column[1], t.shift_mm}) now.insert(now.end(), {v.x, v.y, v.z});
   }
+  std::uint64_t version = 0;
+  for (const auto& [id, view] : bodies_) version += view->version();
+  take_coarse();
   const auto time = std::chrono::steady_clock::now();
   if (now != camera_) {
-    wake();
+    wake(coarse);
     camera_ = std::move(now);
     since_ = time;
-    return;
+    return false;
   }
   if (looking_.valid() && looking_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
     const std::vector<Seen> seen = looking_.get();
@@ -167,13 +224,20 @@ void WorldView::rest(int width, int height) {
       for (const Seen& s : seen) {
         if (const auto body = bodies_.find(s.body); body != bodies_.end() && s.chunk < body->second->chunks())
           body->second->draw_only(s.chunk, s.arrays.version, s.triangles);
-        drawn_ += s.triangles.size() / 3;
       }
     }
-    return;
   }
-  constexpr auto kRest = std::chrono::milliseconds(300);
-  if (looked_ || looking_.valid() || time - since_ < kRest) return;
+  if (looking_.valid() || time - since_ < kStill) return false;
+  const bool still = time - changed_at_ > kStill;
+  // Of what the camera saw before the bone changed, and lay whole since, only what is seen, once the bone rests.
+  if (looked_ && (looked_version_ == version || !still)) {
+    if (still && coarse && coarse_version_ != version && !coarsening_.valid()) {
+      coarse_version_ = version;
+      make_coarse();
+    }
+    return still;
+  }
+  looked_version_ = version;
   looked_ = true;
   const double* const m = camera->GetCompositeProjectionTransformMatrix(renderer_->GetTiledAspectRatio(), -1, 1)->GetData();
   std::vector<Seen> jobs;
@@ -188,7 +252,7 @@ void WorldView::rest(int width, int height) {
       }
     }
     for (std::size_t n = 0; n < view->chunks(); ++n) {
-      jobs.push_back({id, n, view->arrays(n), {}});
+      jobs.push_back({id, n, view->arrays(n), {}, 0});
       matrices.push_back(clip);
     }
   }
@@ -214,6 +278,7 @@ void WorldView::rest(int width, int height) {
     }
     return jobs;
   });
+  return false;
 }
 
 Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p, SoftBody* soft) {
@@ -225,6 +290,7 @@ Picture draw_world(const World& world, SceneReaders& readers, const StructureMap
   view.update(world, readers);
   if (soft != nullptr) view.update_soft(*soft);
   look_at(renderer, p.centre_mm, p.radius_mm, p.eye);
+  set_depth(renderer, {true, 1});
   return window.render();
 }
 

@@ -35,6 +35,7 @@ enum class Command {
   reset,
   home,
   sound,
+  quality,
   help,
   quit,
 };

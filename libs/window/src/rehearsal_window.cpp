@@ -13,7 +13,6 @@
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
-#include <vtkOpenGLState.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
@@ -40,6 +39,7 @@
 #include "osteo/view/offscreen.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
+#include "scene_painter.h"
 #include "scene_tools.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
@@ -65,6 +65,8 @@ class RehearsalWindow {
         device_name_(options.device) {
     if (hu != nullptr) cuts_.set_hu(*hu);
     open(options);
+    painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
+    painter_->quality().want(options.quality);
     make_scene();
     look_from(kFromLeft);
     show_words("loading the case");
@@ -108,7 +110,6 @@ class RehearsalWindow {
     render_window_->SetReadyForRendering(true);
     render_window_->SetMultiSamples(0);
     render_window_->OpenGLInitContext();
-    render_window_->SetFrameBlitModeToBlitToCurrent();
     render_window_->AddRenderer(renderer_);
 
     // ImGui chains this callback behind its own.
@@ -272,18 +273,25 @@ class RehearsalWindow {
     const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
     renderer_->SetViewport(left, 0, right, 1);
     renderer_->ResetCameraClippingRange();
-    if (world_view_ && !control_.failure()) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
+    const SceneBox box{kPanelWidth, 0, width_ - kPanelWidth - kSliceWidth, height_};
+    const bool settled = !world_view_ || control_.failure() || world_view_->rest(box.width, box.height, painter_->coarse());
+    const bool shows = painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData());
+    if (!shows) return painter_->wait();
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    render_window_->GetState()->Reset();
-    render_window_->Render();
-    // VTK leaves its state for itself; ImGui saves and restores what it touches.
-    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    painter_->show();
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (screenshot_wanted_) save_screenshot();
     for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
     glfwSwapBuffers(window_);
+    painter_->done();
+  }
+
+  [[nodiscard]] static bool input() {
+    const ImGuiIO& io = ImGui::GetIO();
+    return io.MouseDelta.x != 0 || io.MouseDelta.y != 0 || io.MouseWheel != 0 || ImGui::IsAnyMouseDown() ||
+           !io.InputQueueCharacters.empty();
   }
 
   // While there is nothing else to see.
@@ -334,7 +342,6 @@ class RehearsalWindow {
       const auto a = static_cast<std::size_t>(r);
       hand.matrix->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
     }
-    hand.matrix->Modified();
     const bool on = tick.device.pedal != 0, shown = (tick.flags & kPlateInHand) == 0;
     hand.head->SetVisibility(shown ? 1 : 0);
     hand.shaft->SetVisibility(shown ? 1 : 0);
@@ -409,6 +416,10 @@ class RehearsalWindow {
     if (command == Command::home) look_from(kFromLeft);
     if (command == Command::help) show_help_ = !show_help_;
     if (command == Command::sound) sound_.turn(!sound_.on());
+    if (command == Command::quality) {
+      QualityChoice& q = painter_->quality();
+      q.want(static_cast<Quality>((static_cast<int>(q.wish()) + 1) % 4));
+    }
     if (command == Command::quit) quit_ = true;
   }
 
@@ -487,7 +498,7 @@ class RehearsalWindow {
     ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
     ImGui::Text("%.2f of %.2f M triangles", static_cast<double>(world_view_->drawn_triangles()) / 1e6,
                 static_cast<double>(world_view_->triangles()) / 1e6);
-    ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
+    ImGui::TextUnformatted(painter_->words().c_str());
     ImGui::Separator();
     draw_approval(approval_, approval_ended_);
     draw_scan(scan_);
@@ -510,6 +521,10 @@ class RehearsalWindow {
     if (state_file_.empty()) return;
     WindowState state;
     state.pictures = pictures_;
+    state.drawn = painter_->drawn();
+    state.at_rest = painter_->at_rest();
+    state.scale = painter_->scale();
+    state.quality = painter_->quality();
     state.failure = control_.failure() ? control_.failure()->what() : "";
     state.message = control_.leading() ? "on the way" : control_.message();
     state.leading = control_.leading();
@@ -554,6 +569,7 @@ class RehearsalWindow {
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
   std::array<DrawnHand, kMostHands> drawn_;
+  std::unique_ptr<ScenePainter> painter_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;

@@ -19,6 +19,13 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
   for (const Vec3 p : s.places_mm) places.push_back(list(p));
   const Vec3 force = from_floats(s.tick.force_n);
   const nlohmann::ordered_json j{{"pictures", s.pictures},
+                                 {"drawn", s.drawn},
+                                 {"at_rest", s.at_rest},
+                                 {"scale", s.scale},
+                                 {"quality", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.wish())]},
+                                 {"level", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.level())]},
+                                 {"moving_ms", s.quality.moving_ms()},
+                                 {"resting_ms", s.quality.resting_ms()},
                                  {"failure", s.failure},
                                  {"message", s.message},
                                  {"leading", s.leading},

@@ -7,11 +7,16 @@
 #include "osteo/bone/rigid_transform.h"
 #include "osteo/bone/saw.h"
 #include "osteo/haptics/stream.h"
+#include "osteo/view/quality.h"
 
 namespace osteo {
 
 struct WindowState {
-  std::uint64_t pictures = 0;
+  std::uint64_t pictures = 0;  // turns of the loop
+  std::uint64_t drawn = 0;     // pictures of the scene
+  bool at_rest = false;
+  double scale = 1;
+  QualityChoice quality;
   std::string failure, message, tool;
   std::filesystem::path session;
   bool leading = false, drill_latched = false, help = false, sucking = false, washing = false, sound = false;

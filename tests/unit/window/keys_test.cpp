@@ -20,7 +20,8 @@ TEST(Keys, EachKeyHasOneMeaning) {
     EXPECT_TRUE(codes.insert(k.code).second) << k.code;
     EXPECT_EQ(find_key(k.code)->command, k.command);
   }
-  EXPECT_EQ(find_key('J'), nullptr);
+  EXPECT_EQ(find_key('J')->command, Command::quality);
+  EXPECT_EQ(find_key('-'), nullptr);
 }
 
 TEST(Keys, HelpTellsOfEachCommandOnceAndOfNoOther) {

@@ -19,6 +19,10 @@ class OffscreenWindow {
 
   [[nodiscard]] vtkGenericOpenGLRenderWindow* window();
   [[nodiscard]] Picture render();
+  /// Several in one thread: before anything is done to the one that is not the last made.
+  void make_current();
+  /// Waits until what was asked to be drawn is drawn.
+  void finish();
 
  private:
   struct Impl;

@@ -1,5 +1,6 @@
 // A scene that is operated on, in a VTK renderer: bodies, plates, structures at risk, dust.
 #pragma once
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <map>
@@ -28,11 +29,16 @@ class WorldView {
   void update_soft(SoftBody& soft);
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
+  /// Of all bone; see BoneView::set_wetness.
+  void set_wetness(double share);
   [[nodiscard]] std::size_t triangles() const;
   /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn until camera or pieces
-  /// move. Bone that changes meanwhile is drawn whole.
-  void rest(int width, int height);
-  [[nodiscard]] std::size_t drawn_triangles() const { return drawn_ > 0 ? drawn_ : triangles(); }
+  /// move. Bone that changes meanwhile is drawn whole. With `coarse`, while the camera moves a quarter of the triangles stand for the bone,
+  /// off by at most kCoarse of a voxel, once another thread has made them. True: nothing is to come but by a change of scene or camera.
+  bool rest(int width, int height, bool coarse = true);
+  static constexpr double kCoarse = 0.35;
+  [[nodiscard]] bool making_coarse() const { return coarsening_.valid(); }
+  [[nodiscard]] std::size_t drawn_triangles() const;
 
  private:
   struct Seen {
@@ -40,8 +46,11 @@ class WorldView {
     std::size_t chunk;
     BoneView::Arrays arrays;
     std::vector<std::uint32_t> triangles;
+    double error_mm;
   };
-  void wake();
+  void wake(bool coarse);
+  void make_coarse();
+  void take_coarse();
   struct Plate {
     vtkSmartPointer<vtkActor> actor, moving;
   };
@@ -56,11 +65,15 @@ class WorldView {
   std::vector<double> camera_;  // and poses, when last looked at
   std::chrono::steady_clock::time_point since_{};
   std::future<std::vector<Seen>> looking_;
-  std::chrono::steady_clock::time_point settle_at_;
+  std::future<std::vector<Seen>> coarsening_;
+  std::atomic<bool> stop_ = false;
+  std::chrono::steady_clock::time_point settle_at_, changed_at_;
+  double wetness_ = 0;
   bool looked_ = false;
-  std::size_t drawn_ = 0;
+  std::uint64_t looked_version_ = 0, coarse_version_ = 0;
 };
 
+/// With all effects (Quality::deep).
 struct WorldPicture {
   Vec3 centre_mm;
   double radius_mm = 50;

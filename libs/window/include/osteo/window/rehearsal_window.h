@@ -9,12 +9,14 @@
 #include "osteo/data/sparse_grid.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/view/quality.h"
 #include "osteo/window/sound_out.h"
 
 namespace osteo {
 
 struct WindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
+  Quality quality = Quality::automatic;
   std::string title;
   int tool = 3;
   bool from_case = true;             ///< how the first session begins

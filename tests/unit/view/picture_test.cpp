@@ -1,0 +1,314 @@
+// What can be seen in pictures of bone: depth, light, colours.
+#include <gtest/gtest.h>
+#include <vtkCamera.h>
+#include <vtkFloatArray.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkRenderer.h>
+#include <vtkTypeInt32Array.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "osteo/io/surface_io.h"
+#include "osteo/io/vtk_data.h"
+#include "osteo/view/actors.h"
+#include "osteo/view/bone_view.h"
+#include "osteo/view/changes.h"
+#include "osteo/view/offscreen.h"
+#include "solid.h"
+
+namespace osteo {
+namespace {
+
+// A block with a hole 8 mm deep and 6 wide, drilled towards the eye, a ridge of 90 degrees and one of 60.
+BrickGrid block() {
+  return test::solid(
+      0.4, 15,
+      [](Vec3 p) {
+        const bool hole = p.y < 2 && std::hypot(p.x, p.z) < 3;
+        const bool ridge = p.y > -6 - 3 && p.y <= -6 && std::abs(p.x - 9) < (p.y + 9);
+        return (p.y > -6 && p.y < 9 && std::abs(p.x) < 13 && std::abs(p.z) < 11 && !hole) || (ridge && std::abs(p.z) < 9);
+      },
+      {}, 2);
+}
+
+struct Scene {
+  OffscreenWindow window{400, 400};
+  vtkNew<vtkRenderer> renderer;
+  Scene() {
+    window.window()->AddRenderer(renderer);
+    set_up_scene(renderer);
+    look_at(renderer, {0, 0, 0}, 14, {0, -1, 0});
+  }
+  Picture draw(const PictureStyle& style) {
+    set_depth(renderer, style);
+    return window.render();
+  }
+};
+
+double grey(const Picture& p, int x, int y) {
+  const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(p.width) + static_cast<std::size_t>(x));
+  return (p.rgb[i] + p.rgb[i + 1] + p.rgb[i + 2]) / 3.0;
+}
+double mean(const Picture& p, int cx, int cy, int half) {
+  double sum = 0;
+  for (int y = cy - half; y <= cy + half; ++y)
+    for (int x = cx - half; x <= cx + half; ++x) sum += grey(p, x, y);
+  return sum / ((2 * half + 1) * (2 * half + 1));
+}
+// Bone is redder than blue, the background the other way round.
+bool is_bone(const Picture& p, std::size_t i) {
+  return p.rgb[i] > p.rgb[i + 2] + 3;
+}
+
+TEST(Picture, ACavityLooksDeep) {
+  const auto bone = block();
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  const auto actor = make_bone_actor(to_vtk(surface.joined().mesh));
+  scene.renderer->AddActor(actor);
+  const Picture none = scene.draw({false, 1});
+  scene.renderer->RemoveActor(actor);
+  BoneView view(scene.renderer);
+  view.show(surface);
+  const Picture plain = scene.draw({false, 1}), deep = scene.draw({true, 1});
+  // The floor, and bone beside the hole. A pixel is 0.073 mm.
+  const auto ratio = [](const Picture& p) { return mean(p, 200, 200, 8) / mean(p, 130, 200, 8); };
+  std::printf("floor over rim: triangles alone %.2f, plain %.2f, deep %.2f\n", ratio(none), ratio(plain), ratio(deep));
+  EXPECT_GT(ratio(none), 0.9);
+  EXPECT_LT(ratio(plain), 0.6);
+  EXPECT_LT(ratio(deep), 0.6);
+  EXPECT_GT(mean(deep, 200, 200, 8), 35);
+  // A picture at rest is the one in motion, but for creases.
+  double off = 0;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < plain.rgb.size(); ++i) off += std::abs(plain.rgb[i] - deep.rgb[i]), ++n;
+  std::printf("mean difference of rest and motion: %.1f of 255\n", off / static_cast<double>(n));
+  EXPECT_LT(off / static_cast<double>(n), 6);
+}
+
+TEST(Picture, NothingBurnsOutAndNoShadowIsBlack) {
+  const auto bone = test::solid(
+      0.5, 14, [](Vec3 p) { return (length(p) < 11 && !(length(p - Vec3{0, -9, 0}) < 6)) || (length(p - Vec3{11, 0, 4}) < 3); }, {}, 2);
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  BoneView view(scene.renderer);
+  view.show(surface);
+  for (const double wet : {0.0, 1.0}) {
+    view.set_wetness(wet);
+    for (const Vec3 eye : {Vec3{0, -1, 0}, {1, 0, 0}, {0.6, -0.7, 0.4}, {-0.5, 0.5, -0.7}}) {
+      look_at(scene.renderer, {0, 0, 0}, 13, normalized(eye));
+      for (const bool effects : {false, true}) {
+        const Picture p = scene.draw({effects, 1});
+        std::size_t white = 0, seen = 0;
+        double darkest = 255, brightest = 0;
+        for (std::size_t i = 0; i < p.rgb.size(); i += 3) {
+          if (!is_bone(p, i)) continue;
+          ++seen;
+          white += std::max({p.rgb[i], p.rgb[i + 1], p.rgb[i + 2]}) >= 250 ? 1 : 0;
+          darkest = std::min(darkest, static_cast<double>(p.rgb[i]));
+          brightest = std::max(brightest, static_cast<double>(p.rgb[i]));
+        }
+        EXPECT_GT(seen, 30000U);
+        EXPECT_LT(static_cast<double>(white), 0.005 * static_cast<double>(seen)) << wet << effects;
+        EXPECT_GT(brightest, 200) << wet << effects;
+        EXPECT_GT(darkest, 8) << wet << effects;
+      }
+    }
+  }
+}
+
+// Edges stay edges: within half a millimetre the light changes as much as it does in all.
+TEST(Picture, EdgesOf90DegreesAreCrisp) {
+  const auto bone = block();
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  look_at(scene.renderer, {9, -9, 0}, 5, {0, -1, 0});
+  BoneView view(scene.renderer);
+  view.show(surface);
+  const Picture p = scene.draw({false, 1});
+  // Across the ridge, 0.025 mm a pixel.
+  double left = 0, right = 0;
+  for (int d = 30; d < 50; ++d) {
+    left += grey(p, 200 - d, 200) / 20;
+    right += grey(p, 200 + d, 200) / 20;
+  }
+  ASSERT_GT(std::abs(left - right), 12);
+  const double near = std::abs(mean(p, 184, 200, 3) - mean(p, 216, 200, 3));
+  EXPECT_GT(near, 0.75 * std::abs(left - right));
+}
+
+TEST(Picture, FewerTrianglesInMotionLookTheSame) {
+  const auto bone = block();
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  look_at(scene.renderer, {0, 0, 0}, 14, normalized({0.5, -0.8, 0.3}));
+  BoneView view(scene.renderer);
+  view.show(surface);
+  const Picture whole = scene.draw({false, 1});
+  for (std::size_t n = 0; n < view.chunks(); ++n) {
+    const auto a = view.arrays(n);
+    const std::size_t before = static_cast<std::size_t>(a.triangles->GetNumberOfValues());
+    auto fewer = coarse_triangles({a.points_mm->GetPointer(0), static_cast<std::size_t>(a.points_mm->GetNumberOfValues())},
+                                  {a.triangles->GetPointer(0), before}, 0.35 * 0.4);
+    EXPECT_LE(fewer.size(), before);
+    view.keep_coarse(n, a.version, fewer);
+    EXPECT_TRUE(view.has_coarse(n));
+  }
+  view.draw_all(true);
+  EXPECT_LT(view.drawn_triangles(), 0.5 * static_cast<double>(view.triangles()));
+  const Picture coarse = scene.draw({false, 1});
+  double off = 0;
+  std::size_t holes = 0;
+  for (std::size_t i = 0; i < whole.rgb.size(); i += 3) {
+    off += std::abs(whole.rgb[i] - coarse.rgb[i]);
+    if (is_bone(whole, i) && !is_bone(coarse, i)) ++holes;
+  }
+  off /= static_cast<double>(whole.rgb.size() / 3);
+  std::printf("%.0f %% of the triangles, mean difference %.2f of 255, %zu pixels lost\n",
+              100.0 * static_cast<double>(view.drawn_triangles()) / static_cast<double>(view.triangles()), off, holes);
+  EXPECT_LT(off, 3);
+  EXPECT_LT(holes, 150U);
+  view.draw_all(false);
+  EXPECT_EQ(scene.draw({false, 1}).rgb, whole.rgb);
+}
+
+TEST(Picture, RefreshedIsAsShownAnew) {
+  auto bone = block();
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  BoneView live(scene.renderer);
+  live.show(surface);
+  for (VoxelKey key = 0; key < bone.brick_count() * BrickGrid::kVoxels; ++key) {
+    const Ijk c = bone.coordinate(key);
+    if (length(bone.frame().world_from_index({1.0 * c.i, 1.0 * c.j, 1.0 * c.k}) - Vec3{-7, -4, 2}) > 4) continue;
+    bone.set(key, 0);
+    surface.mark(key);
+  }
+  live.update(surface, surface.update());
+  live.update(surface, surface.settle());
+  live.refresh(surface);
+  const Picture followed = scene.draw({false, 1});
+  live.show(surface);
+  EXPECT_EQ(scene.draw({false, 1}).rgb, followed.rgb);
+}
+
+TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
+  const auto bone = test::solid(0.5, 8, [](Vec3 p) { return length(p) < 6; }, {}, 2);
+  LiveSurface surface(bone, {});
+  Scene scene;
+  BoneView view(scene.renderer);
+  view.show(surface);
+  const auto stamp = [&] { return scene_stamp(scene.renderer); };
+  static_cast<void>(scene.draw({false, 1}));
+  std::uint64_t last = 0;
+  for (const bool effects : {false, true, false}) {
+    static_cast<void>(scene.draw({effects, 1}));
+    last = stamp();
+    scene.window.window()->Render();
+    scene.renderer->ResetCameraClippingRange();
+    view.place({});
+    view.highlight(false);
+    view.set_wetness(0);
+    EXPECT_EQ(stamp(), last);
+  }
+  const auto changed = [&](const char* what) {
+    EXPECT_NE(stamp(), last) << what;
+    last = stamp();
+  };
+  scene.renderer->GetActiveCamera()->Azimuth(1);
+  changed("camera");
+  view.place({{}, {1, 0, 0}});
+  changed("a body moved");
+  view.place({{}, {1, 0, 0.5}});
+  changed("and again");
+  view.highlight(true);
+  changed("highlight");
+  view.set_wetness(0.5);
+  changed("wetness");
+  view.update(surface, std::vector<std::uint32_t>{surface.bone().find_brick(1, 1, 1)});
+  changed("bone");
+  const auto actor = make_plate_actor(surface.joined().mesh);
+  scene.renderer->AddActor(actor);
+  changed("something new");
+  scene.renderer->RemoveActor(actor);
+  changed("something gone");
+}
+
+// Bone that gets thinner over a nerve takes on its colour without steps.
+TEST(Colours, ShineThroughThinBoneWithoutSteps) {
+  Labels labels;
+  labels.frame.dims = {40, 40, 40};
+  labels.frame.spacing_mm = {0.4, 0.4, 0.4};
+  labels.frame.origin_mm = {-8, -8, -8};
+  const auto voxels = make_voxels<std::uint8_t>(labels.frame.voxel_count());
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i) voxels[static_cast<std::size_t>((k * 40 + j) * 40 + i)] = std::hypot(j - 20, k - 20) < 4 ? 6 : 0;
+  labels.voxels = voxels;
+  labels.structures = {{6, "facial nerve", {255, 255, 0}}};
+  const StructureMap map(labels);
+  double last = 2, widest = 0;
+  for (double depth = 0.02; depth < 3; depth += 0.02) {
+    const double share = shine_through(map, {0, 0, 1.6 + depth}, {0, 0, -1}).share;
+    EXPECT_LE(share, last + 0.02) << depth;
+    if (last <= 1) widest = std::max(widest, last - share);
+    last = share;
+  }
+  EXPECT_EQ(last, 0);
+  EXPECT_GT(shine_through(map, {0, 0, 1.8}, {0, 0, -1}).share, 0.5);
+  EXPECT_LT(widest, 0.06);
+}
+
+// The speckle of cut cancellous bone belongs to the place.
+TEST(Colours, SpeckleStaysWhereItIs) {
+  const auto bone = test::solid(0.4, 10, [](Vec3 p) { return p.z < 2; }, {}, 1);
+  // 300 HU everywhere.
+  SparseGrid hu = to_sparse(bone, "hu");
+  BrickGrid values = to_bricks(hu, true);
+  for (VoxelKey key = 0; key < values.brick_count() * BrickGrid::kVoxels; ++key) values.set(key, 300);
+  const auto spongy = std::make_shared<const Hardness>(bone, to_sparse(values, "hu"));
+  for (VoxelKey key = 0; key < values.brick_count() * BrickGrid::kVoxels; ++key) values.set(key, 1600);
+  const auto dense = std::make_shared<const Hardness>(bone, to_sparse(values, "hu"));
+  const LiveSurface surface(bone, {});
+  const auto spread = [&](const std::shared_ptr<const Hardness>& h, double& red_over_blue) {
+    const BonePaint paint(bone, nullptr, h);
+    std::vector<Rgb> colours, again;
+    double sum = 0, squares = 0, n = 0;
+    red_over_blue = 0;
+    for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
+      const SurfacePatch& patch = surface.patch(b);
+      paint.paint(bone, patch, colours);
+      paint.paint(bone, patch, again);
+      EXPECT_EQ(colours, again);
+      for (std::size_t v = 0; v < colours.size(); ++v) {
+        const Vec3 at = from_floats(patch.vertices[v].index);
+        if (patch.vertices[v].normal[2] < 0.99F || at.x < 12 || at.y < 12 || at.x > 36 || at.y > 36) continue;
+        sum += colours[v][0];
+        squares += colours[v][0] * colours[v][0];
+        red_over_blue += colours[v][0] / static_cast<double>(colours[v][2]);
+        ++n;
+      }
+    }
+    EXPECT_GT(n, 100);
+    red_over_blue /= n;
+    return std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)));
+  };
+  double red = 0, pale = 0;
+  const double rough = spread(spongy, red), even = spread(dense, pale);
+  EXPECT_GT(rough, 3);
+  EXPECT_LT(even, 1);
+  EXPECT_GT(red, 1.15 * pale);
+}
+
+}  // namespace
+}  // namespace osteo
