@@ -240,6 +240,8 @@ struct WindowCommand {
     window.width = p.width;
     window.height = p.height;
     window.state_file = p.state_file;
+    if (const auto it = the_case.files.find("region"); it != the_case.files.end()) window.bone.push_back(load_grid(it->second));
+    window.bone.push_back(the_case.bone);
     window.approval = approval.words();
     window.approval_ended = approval.state == ApprovalState::outdated;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));

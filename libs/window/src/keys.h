@@ -35,6 +35,8 @@ enum class Command {
   reset,
   home,
   sound,
+  cut_in_middle,
+  cuts_along_tool,
   help,
   quit,
 };

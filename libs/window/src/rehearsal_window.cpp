@@ -38,6 +38,7 @@
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/structures_view.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
 #include "scene_tools.h"
@@ -49,7 +50,7 @@
 namespace osteo {
 namespace {
 
-constexpr int kPanelWidth = 270, kSliceWidth = 290;
+constexpr int kPanelWidth = 270;
 constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 
 class RehearsalWindow {
@@ -63,7 +64,7 @@ class RehearsalWindow {
         approval_ended_(options.approval_ended),
         state_file_(options.state_file),
         device_name_(options.device) {
-    if (hu != nullptr) cuts_.set_hu(*hu);
+    cuts_.set_case(hu, options.bone);
     open(options);
     make_scene();
     look_from(kFromLeft);
@@ -76,6 +77,7 @@ class RehearsalWindow {
   ~RehearsalWindow() {
     glfwMakeContextCurrent(window_);
     cuts_.release();
+    structures_.reset();
     tools_.reset();
     world_view_.reset();
     render_window_->Finalize();
@@ -148,7 +150,9 @@ class RehearsalWindow {
     world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
     rehearsal.look([&](const World& world, SceneReaders& readers) { world_view_->update(world, readers); });
     if (!tools_) tools_ = std::make_unique<SceneTools>(renderer_);
-    cuts_.renew();
+    if (!structures_ && rehearsal.structures() != nullptr)  // the same in all sessions
+      structures_ = std::make_unique<StructuresView>(renderer_, *rehearsal.structures());
+    cuts_.begin(rehearsal, structures_.get());
   }
 
   void look_from(Vec3 eye) { look_at(renderer_, control_.centre_mm(), 0.8 * control_.radius_mm(), normalized(eye)); }
@@ -214,6 +218,7 @@ class RehearsalWindow {
       return;
     }
     begin_picture();
+    cuts_.lay_out(width_, height_, kPanelWidth);
     if (control_.failure()) {
       tell_failure();
     } else {
@@ -236,8 +241,7 @@ class RehearsalWindow {
     if (control_.failure()) return;
     Rehearsal& now = control_.rehearsal();
     draw_instrument(drawn_[0], control_.tool());
-    cuts_.draw(now, control_.tool(),
-               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
+    cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
     if (show_help_) draw_help(show_help_, width_);
     now.look([&](const World& world, SceneReaders& readers) {
       world_view_->update(world, readers);
@@ -269,10 +273,12 @@ class RehearsalWindow {
   void end_picture() {
     ImGui::Render();
     render_window_->SetSize(width_, height_);
-    const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
-    renderer_->SetViewport(left, 0, right, 1);
+    const CutsPanel::Box& scene = cuts_.scene();
+    const auto of = [](float a, int b) { return static_cast<double>(a) / b; };
+    renderer_->SetViewport(of(scene.x, width_), 1 - of(scene.y + scene.height, height_), of(scene.x + scene.width, width_),
+                           1 - of(scene.y, height_));
     renderer_->ResetCameraClippingRange();
-    if (world_view_ && !control_.failure()) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
+    if (world_view_ && !control_.failure()) world_view_->rest(static_cast<int>(scene.width), static_cast<int>(scene.height));
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -346,8 +352,7 @@ class RehearsalWindow {
     HandTools& tools = control_.tools();
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
-    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
-                         m.y < static_cast<float>(height_) && !show_help_;
+    const bool in_view = cuts_.scene().holds(m.x, m.y) && !show_help_;
     vtkCamera* const camera = renderer_->GetActiveCamera();
     if (in_view && !io.WantCaptureMouse) {
       if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
@@ -409,6 +414,11 @@ class RehearsalWindow {
     if (command == Command::home) look_from(kFromLeft);
     if (command == Command::help) show_help_ = !show_help_;
     if (command == Command::sound) sound_.turn(!sound_.on());
+    if (command == Command::cut_in_middle) cuts_.control().enlarge_or_back();
+    if (command == Command::cuts_along_tool) {
+      const bool along = cuts_.control().planes() == CutsControl::Planes::tool;
+      cuts_.control().take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+    }
     if (command == Command::quit) quit_ = true;
   }
 
@@ -555,6 +565,7 @@ class RehearsalWindow {
   vtkNew<vtkRenderer> renderer_;
   std::array<DrawnHand, kMostHands> drawn_;
   std::unique_ptr<WorldView> world_view_;
+  std::unique_ptr<StructuresView> structures_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
   std::string device_name_;

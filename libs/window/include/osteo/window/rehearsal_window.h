@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "osteo/base/error.h"
 #include "osteo/data/sparse_grid.h"
@@ -22,6 +23,7 @@ struct WindowOptions {
   VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
   std::string approval;              ///< of the case, in words; empty: unknown
   bool approval_ended = false;       ///< by a later change: said in another colour
+  std::vector<SparseGrid> bone;      ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
