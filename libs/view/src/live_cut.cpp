@@ -33,6 +33,30 @@ std::optional<double> CtValues::at_world(Vec3 world_mm) const {
   return std::isnan(hu) ? std::nullopt : std::optional(static_cast<double>(hu));
 }
 
+double difference_hu(const SparseGrid& kept, const Image& scan) {
+  const BrickGrid values = to_bricks(kept, true);
+  const GridSampler stored(kept);
+  const CtValues ct(scan);
+  const std::size_t all = values.brick_count() * BrickGrid::kVoxels, step = std::max<std::size_t>(1, all / 40'000);
+  std::vector<float> off;
+  std::size_t outside = 0;
+  for (std::size_t v = 0; v < all; v += step) {
+    const Ijk c = values.coordinate(static_cast<VoxelKey>(v));
+    const Vec3 at{double(c.i), double(c.j), double(c.k)};
+    const float hu = stored.linear_stored_at(at);
+    if (std::isnan(hu)) continue;
+    const auto there = ct.at_world(kept.frame.world_from_index(at));
+    if (there) {
+      off.push_back(std::abs(hu - static_cast<float>(*there)));
+    } else {
+      ++outside;
+    }
+  }
+  if (off.empty() || 20 * outside > off.size()) return std::numeric_limits<double>::infinity();
+  std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
+  return static_cast<double>(off[off.size() / 2]);
+}
+
 void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::uint32_t>& rgba) {
   struct Laid {
     const BrickGrid* bone;

@@ -26,6 +26,8 @@ void CutsControl::resize(int cut, int width, int height) {
 void CutsControl::set_bounds(Vec3 lo, Vec3 hi, double step_mm) {
   bounds_mm_ = {lo, hi};
   step_mm_ = step_mm;
+  for (SliceView& v : views_) v.centre_mm = (lo + hi) * 0.5;
+  centred_ = true;
 }
 
 const char* CutsControl::name(int cut) const {
@@ -59,18 +61,16 @@ void CutsControl::tool_is(Vec3 tip_mm, Vec3 axis) {
   axis_ = axis;
   if (!follows_) return;
   if (planes_ == Planes::tool) turn_to_tool();
-  cross_mm_ = tip_mm;  // wherever the hand is
-  for (SliceView& v : views_) {
-    v.through_mm = tip_mm;
-    if (!centred_) v.centre_mm = tip_mm;
+  set_cross(tip_mm);
+  if (!centred_) {
+    for (SliceView& v : views_) v.centre_mm = cross_mm_;
   }
   centred_ = true;
   keep_cross_in_view();
-  if (pointer_.view >= 0) under_mouse_ = view(pointer_.view).world(pointer_.x, pointer_.y);
 }
 
 void CutsControl::keep_cross_in_view() {
-  constexpr double kMargin = 0.35;
+  constexpr double kMargin = 0.2;
   for (SliceView& v : views_) {
     const auto p = v.pixel(cross_mm_);
     const double x = std::clamp(p[0], kMargin * v.width, (1 - kMargin) * v.width);

@@ -20,10 +20,11 @@ class CutsControl {
   // --- each frame
   /// Pixels of a cut on the screen.
   void resize(int cut, int width, int height);
-  /// Where the crosshair may go, and how far a notch of the wheel scrolls.
+  /// A box around the bone: the crosshair stays in it, and its middle is in the middle of the pictures at first. `step_mm`: how far a notch
+  /// of the wheel scrolls.
   void set_bounds(Vec3 lo_mm, Vec3 hi_mm, double step_mm);
-  /// The tool in the hand: its tip and its axis (unit, along the handle). While the cuts follow it, they go through its tip, and the
-  /// picture stands still until the tip comes near its edge.
+  /// The tool in the hand: its tip and its axis (unit, along the handle). While the cuts follow it, they go through its tip (or the
+  /// place of the bone's box nearest to it), and the picture stands still until that comes near its edge.
   void tool_is(Vec3 tip_mm, Vec3 axis);
 
   [[nodiscard]] const SliceView& view(int cut) const { return views_[static_cast<std::size_t>(cut)]; }

@@ -7,8 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "osteo/base/json_document.h"
 #include "slice_overlay.h"
 
 namespace osteo {
@@ -38,6 +38,14 @@ TriMesh blade_of(const SawCut& cut) {
   return box;
 }
 
+// Kept in the session: what could be seen is part of what was done.
+void note_look(Rehearsal& rehearsal, const StructuresView::One& s) {
+  const Json note{{"structure", s.value},
+                  {"name", rehearsal.structures()->name_of(s.value)},
+                  {"look", EnumNames<StructureLook>::values[static_cast<std::size_t>(s.look)]}};
+  rehearsal.note("structure", note.dump());
+}
+
 bool small_button(const char* words, bool chosen) {
   if (chosen) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
   const bool clicked = ImGui::SmallButton(words);
@@ -63,8 +71,10 @@ void CutsPanel::release() {
   glDeleteTextures(CutsControl::kCuts, textures_.data());
 }
 
-void CutsPanel::set_case(const SparseGrid* hu, const std::vector<SparseGrid>& bone) {
-  if (hu != nullptr) {
+void CutsPanel::set_case(const std::optional<Image>& scan, const SparseGrid* hu, const std::vector<SparseGrid>& bone) {
+  if (scan) {
+    ct_ = ct_under_mouse_ = std::make_shared<const CtValues>(*scan);  // a dense one any thread may ask
+  } else if (hu != nullptr) {
     ct_ = std::make_shared<const CtValues>(*hu);
     ct_under_mouse_ = std::make_shared<const CtValues>(*hu);
   }
@@ -76,21 +86,27 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures) {
   structures_ = structures;
   std::vector<CutStructure> outlined;
   if (structures != nullptr) {
-    for (const StructuresView::One& s : structures->all()) outlined.push_back({s.value, s.surface});
+    for (const StructuresView::One& s : structures->all()) {
+      outlined.push_back({s.value, s.surface});
+      if (s.look != StructureLook::solid) note_look(rehearsal, s);  // as the session before left it
+    }
   }
   double voxel_mm = 0.5;
   rehearsal.look([&](const World& world, SceneReaders&) {
     voxel_mm = world.finest_voxel_mm();
-    const Frame& f = world.bodies().front().body->bone.frame();
     Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    for (int c = 0; c < 8; ++c) {
-      const Vec3 p = f.world_from_index(
-          {(c & 1) != 0 ? f.dims[0] - 0.5 : -0.5, (c & 2) != 0 ? f.dims[1] - 0.5 : -0.5, (c & 4) != 0 ? f.dims[2] - 0.5 : -0.5});
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], p[a]);
-        hi[a] = std::max(hi[a], p[a]);
+    for (const PlacedBody& b : world.bodies()) {
+      const BrickGrid& bone = b.body->bone;
+      for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+        const Ijk at = bone.brick_coordinate(brick);
+        const Vec3 p = b.world_from_body(bone.frame().world_from_index({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5}));
+        for (std::size_t a = 0; a < 3; ++a) {
+          lo[a] = std::min(lo[a], p[a]);
+          hi[a] = std::max(hi[a], p[a]);
+        }
       }
     }
+    if (lo.x > hi.x) lo = hi = {};
     control_.set_bounds(lo, hi, voxel_mm);
   });
   constexpr double kPixelsToAVoxel = 2.5;  // more would show nothing that a smooth enlargement does not
@@ -180,9 +196,9 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     if (small_button(kShort[p], control_.preset() == p)) control_.take_preset(p);
     if (ImGui::IsItemHovered()) {
       const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
-      ImGui::SetTooltip("window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s",
-                        hu.width, hu.level,
-                        ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black." : "");
+      ImGui::SetTooltip(
+          "window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s", hu.width, hu.level,
+          ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan." : "");
     }
   }
   ImGui::SameLine();
@@ -326,10 +342,7 @@ void CutsPanel::list_structures(Rehearsal& rehearsal) {
     const StructuresView::One& s = structures_->all()[number];
     if (s.look == look) return;
     structures_->show(number, look);
-    rehearsal.note("structure", nlohmann::ordered_json{{"structure", s.value},
-                                                       {"name", map.name_of(s.value)},
-                                                       {"look", EnumNames<StructureLook>::values[static_cast<std::size_t>(look)]}}
-                                    .dump());
+    note_look(rehearsal, s);
   };
   const auto choice = [&](const char* id, std::optional<StructureLook> now, auto&& chosen) {
     ImGui::PushID(id);

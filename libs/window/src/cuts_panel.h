@@ -20,8 +20,8 @@ class CutsPanel {
   /// With an OpenGL context: makes and frees the textures.
   void create();
   void release();
-  /// CT values, and density as the case has it, the finest first.
-  void set_case(const SparseGrid* hu, const std::vector<SparseGrid>& bone);
+  /// CT values (the scan's, else what the case keeps, may be null) and density as the case has it, the finest first.
+  void set_case(const std::optional<Image>& scan, const SparseGrid* hu, const std::vector<SparseGrid>& bone);
   /// A rehearsal has begun. `structures` (may be null) must live until the next call.
   void begin(Rehearsal& rehearsal, StructuresView* structures);
 

@@ -64,7 +64,7 @@ class RehearsalWindow {
         approval_ended_(options.approval_ended),
         state_file_(options.state_file),
         device_name_(options.device) {
-    cuts_.set_case(hu, options.bone);
+    cuts_.set_case(options.ct, hu, options.bone);
     open(options);
     make_scene();
     look_from(kFromLeft);
