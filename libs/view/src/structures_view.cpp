@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "osteo/base/parallel.h"
 #include "osteo/io/vtk_data.h"
@@ -52,6 +53,23 @@ void spread(const TriMesh& mesh, std::vector<T>& values, int times) {
   }
 }
 
+// For each point how many hang together with it.
+std::vector<std::uint32_t> sizes_of_parts(const TriMesh& mesh) {
+  std::vector<std::uint32_t> root(mesh.points_mm.size()), size(root.size(), 0);
+  std::iota(root.begin(), root.end(), 0U);
+  const auto find = [&](std::uint32_t p) {
+    while (root[p] != p) p = root[p] = root[root[p]];
+    return p;
+  };
+  for (const auto& t : mesh.triangles) {
+    for (const std::uint32_t p : t) root[find(p)] = find(t[0]);
+  }
+  for (std::uint32_t p = 0; p < root.size(); ++p) ++size[find(p)];
+  std::vector<std::uint32_t> together(root.size());
+  for (std::uint32_t p = 0; p < root.size(); ++p) together[p] = size[find(p)];
+  return together;
+}
+
 }  // namespace
 
 TriMesh smooth_surface(const TriMesh& face, double most_mm) {
@@ -90,7 +108,11 @@ TriMesh smooth_surface(const TriMesh& face, double most_mm) {
         smooth.points_mm[p] = to_floats(from_floats(smooth.points_mm[p]) + from_floats(smooth.normals[p]) * lost[p]);
     }
   }
+  // A few voxels by themselves would be a point before it is given back what they lost: they stay as they are.
+  constexpr std::uint32_t kFewPoints = 60;
+  const std::vector<std::uint32_t> together = sizes_of_parts(face);
   for (std::size_t p = 0; p < smooth.points_mm.size(); ++p) {
+    if (together[p] < kFewPoints) smooth.points_mm[p] = face.points_mm[p];
     const Vec3 from = from_floats(face.points_mm[p]), by = from_floats(smooth.points_mm[p]) - from;
     if (length(by) > most_mm) smooth.points_mm[p] = to_floats(from + by * (most_mm / length(by)));
   }

@@ -530,6 +530,9 @@ class RehearsalWindow {
     state.sucking = control_.sucking();
     state.washing = control_.washing();
     state.sound = sound_.on();
+    state.cut_in_middle = cuts_.control().enlarged();
+    state.cuts_along_tool = cuts_.control().planes() == CutsControl::Planes::tool;
+    state.cuts_ms = cuts_.last_ms();
     state.hand = static_cast<int>(control_.tools().tool());
     state.cut = control_.tools().cut();
     state.plate = control_.tools().plate_grip();

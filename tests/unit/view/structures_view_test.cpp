@@ -116,6 +116,24 @@ TEST(StructureSurfaces, AreSmoothAndWhereTheBodyIs) {
   }
 }
 
+TEST(StructureSurfaces, ACrumbStaysWhatItIs) {
+  const Labels labels = labelled(6, {0.5, 0.5, 0.5}, [](Vec3 p) { return std::min(length(p) - 3, length(p - Vec3{5, 0, 0}) - 0.45); });
+  const StructureMap map(labels, 2);
+  const TriMesh smooth = smooth_surface(map.face(0), 0.25);
+  int crumb = 0, moved = 0;
+  for (std::size_t p = 0; p < smooth.points_mm.size(); ++p) {
+    const bool same = smooth.points_mm[p] == map.face(0).points_mm[p];
+    if (smooth.points_mm[p][0] > 4) {
+      ++crumb;
+      EXPECT_TRUE(same);
+    } else {
+      moved += same ? 0 : 1;
+    }
+  }
+  EXPECT_GT(crumb, 5);
+  EXPECT_GT(moved, 100);
+}
+
 TEST(StructuresView, ClearLetsEveryOtherPixelThroughAndHiddenAll) {
   // A small ball behind a large one.
   Labels labels = labelled(8, {0.5, 0.5, 0.5}, [](Vec3 p) { return length(p - Vec3{0, -3, 0}) - 4; });

@@ -25,7 +25,8 @@ struct EnumNames<StructureLook> {
 
 /// The face of a structure without the steps of its voxels, with normals: a windowed sinc (G. Taubin, T. Zhang, G. Golub, Optimal surface
 /// smoothing as filter design, 1996; VTK's filter) in rounds, after each of which what the surface lost is given back evenly, so that tubes
-/// two voxels thick stay as thick as they were. No point moves farther than `most_mm`. Distances are measured from the face itself. Errors:
+/// two voxels thick stay as thick as they were. No point moves farther than `most_mm`; parts
+/// of fewer than 60 points, two voxels or so, stay as they are. Distances are measured from the face itself. Errors:
 /// docs/accuracy.md. About 40 us a point.
 [[nodiscard]] TriMesh smooth_surface(const TriMesh& face, double most_mm);
 
