@@ -36,6 +36,7 @@ struct WindowFlags {
   bool dust = false;
   double rate_hz = 1000;
   std::string resume;
+  std::string scan;
   bool sound = true;
   double volume = 0.7;
   bool alarms = false;
@@ -61,6 +62,10 @@ struct WindowFlags {
     visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
+    visit(
+        {"scan",
+         "in the window, the case's CT as a volume file: cuts then show soft tissue too (empty: the bone's values, which the case keeps)"},
+        p.scan);
     visit({"sound", "in the window, what drilling sounds like (a model, docs/sound.md), on the machine's sound card where there is one"},
           p.sound);
     visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);

@@ -167,6 +167,11 @@ def keys():
         deeper = key("Down", "deeper", lambda s: s["goal_mm"] != before["goal_mm"])
         assert dot([a - b for a, b in zip(deeper["goal_mm"], before["goal_mm"])], before["eye"]) < -0.2, (before, deeper)
         key("Up", "back", lambda s: apart(s["goal_mm"], before["goal_mm"]) < 1e-6)
+        # The cuts.
+        key("w", "a cut in the middle", lambda s: s["cut_in_middle"] == 0)
+        key("w", "the bone in the middle", lambda s: s["cut_in_middle"] == -1)
+        key("g", "cuts along the tool", lambda s: s["cuts_along_tool"])
+        key("g", "cuts along the body", lambda s: not s["cuts_along_tool"])
         # The view, the help, a picture.
         turned = w.drag(3, 60, 20)
         assert dot(turned["eye"], before["eye"]) < 0.99

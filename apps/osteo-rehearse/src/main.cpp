@@ -12,9 +12,11 @@
 #include "osteo/cli/command.h"
 #include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
+#include "osteo/io/volume_io.h"
 #include "osteo/scene/approval.h"
 #include "osteo/scene/free_ways.h"
 #include "osteo/scene/session_folder.h"
+#include "osteo/view/live_cut.h"
 #include "osteo/window/rehearsal_window.h"
 #include "window_flags.h"
 
@@ -234,6 +236,16 @@ struct WindowCommand {
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
     WindowOptions window;
+    if (!p.scan.empty()) {
+      window.ct = load_image(p.scan, io.context);
+      constexpr double kOwnHu = 60;
+      if (!hu) {
+        io.context.warn("this case keeps no CT values, so whether --scan is its scan could not be checked");
+      } else if (!(difference_hu(*hu, *window.ct) < kOwnHu)) {
+        throw Error(ExitCode::usage, "--scan is not the scan of this case, or does not lie where it lay",
+                    "'osteo hand-over CASE FOLDER' writes the case's own as ct.nrrd");
+      }
+    }
     window.title = "Osteotome - " + the_case.folder.filename().string();
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
@@ -241,6 +253,8 @@ struct WindowCommand {
     window.width = p.width;
     window.height = p.height;
     window.state_file = p.state_file;
+    if (const auto it = the_case.files.find("region"); it != the_case.files.end()) window.bone.push_back(load_grid(it->second));
+    window.bone.push_back(the_case.bone);
     window.approval = approval.words();
     window.approval_ended = approval.state == ApprovalState::outdated;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));

@@ -155,6 +155,8 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
 
 StructureMap::StructureMap(const Labels& labels, double reach_mm, const Context& context)
     : reach_mm_(reach_mm), structures_(labels.structures) {
+  const Vec3 h = labels.frame.spacing_mm;
+  spacing_mm_ = {std::min({h.x, h.y, h.z}), std::max({h.x, h.y, h.z})};
   using Box = std::array<std::array<int, 2>, 3>;
   constexpr int kMany = std::numeric_limits<int>::max();
   std::array<Box, 256> boxes;
@@ -251,20 +253,6 @@ StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_m
     if (gap < nearest.distance_mm) nearest = {gap, values_[s]};
   }
   return nearest;
-}
-
-std::pair<TriMesh, std::vector<std::uint8_t>> StructureMap::surface() const {
-  TriMesh mesh;
-  std::vector<std::uint8_t> whose;
-  for (std::size_t s = 0; s < parts_.size(); ++s) {
-    const TriMesh& face = parts_[s].face;
-    const auto first = static_cast<std::uint32_t>(mesh.points_mm.size());
-    mesh.points_mm.insert(mesh.points_mm.end(), face.points_mm.begin(), face.points_mm.end());
-    mesh.normals.insert(mesh.normals.end(), face.normals.begin(), face.normals.end());
-    for (const auto& t : face.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    whose.resize(mesh.points_mm.size(), values_[s]);
-  }
-  return {std::move(mesh), std::move(whose)};
 }
 
 std::array<double, 3> StructureMap::colour_of(std::uint8_t structure) const {

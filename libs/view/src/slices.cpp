@@ -8,14 +8,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace osteo {
 namespace {
 
-struct Axes {
-  Vec3 right, down;
-};
-Axes axes_of(Plane plane) {
+// Distinct tints for the first labels; later ones repeat.
+constexpr std::array<std::array<double, 3>, 8> kTints{
+    {{235, 120, 60}, {90, 200, 120}, {90, 150, 255}, {240, 220, 80}, {220, 90, 200}, {80, 220, 220}, {255, 150, 150}, {180, 180, 90}}};
+
+}  // namespace
+
+SliceAxes axes_of(Plane plane) {
   switch (plane) {
     case Plane::axial:
       return {{1, 0, 0}, {0, 1, 0}};
@@ -27,23 +31,77 @@ Axes axes_of(Plane plane) {
   return {};
 }
 
-// Distinct tints for the first labels; later ones repeat.
-constexpr std::array<std::array<double, 3>, 8> kTints{
-    {{235, 120, 60}, {90, 200, 120}, {90, 150, 255}, {240, 220, 80}, {220, 90, 200}, {80, 220, 220}, {255, 150, 150}, {180, 180, 90}}};
-
-}  // namespace
+Vec3 SliceView::normal() const {
+  const SliceAxes a = axes();
+  return cross(a.right, a.down);
+}
 
 Vec3 SliceView::world(double px, double py) const {
-  const Axes a = axes_of(plane);
-  const Vec3 normal = cross(a.right, a.down);
-  const Vec3 base = centre_mm + normal * dot(through_mm - centre_mm, normal);
+  const SliceAxes a = axes();
+  const Vec3 n = cross(a.right, a.down);
+  const Vec3 base = centre_mm + n * dot(through_mm - centre_mm, n);
   return base + a.right * ((px + 0.5 - width / 2.0) * mm_per_pixel) + a.down * ((py + 0.5 - height / 2.0) * mm_per_pixel);
 }
 
 std::array<double, 2> SliceView::pixel(Vec3 world_mm) const {
-  const Axes a = axes_of(plane);
+  const SliceAxes a = axes();
   const Vec3 d = world_mm - centre_mm;
   return {dot(d, a.right) / mm_per_pixel + width / 2.0 - 0.5, dot(d, a.down) / mm_per_pixel + height / 2.0 - 0.5};
+}
+
+void SliceView::zoom_about(double px, double py, double factor) {
+  const Vec3 before = world(px, py);
+  mm_per_pixel = std::clamp(mm_per_pixel / factor, 0.005, 5.0);
+  centre_mm += before - world(px, py);
+}
+
+void SliceView::drag(double dx, double dy) {
+  centre_mm += world(0, 0) - world(dx, dy);
+}
+
+void SliceView::resize(int new_width, int new_height) {
+  if (width == new_width && height == new_height) return;
+  mm_per_pixel *= std::min(width, height) / static_cast<double>(std::max(1, std::min(new_width, new_height)));
+  width = std::max(1, new_width);
+  height = std::max(1, new_height);
+}
+
+std::array<std::string, 4> edge_letters(const SliceView& view) {
+  const auto [right, down] = view.axes();
+  const auto towards = [](Vec3 d) {
+    constexpr const char* kSides[3] = {"RL", "AP", "FH"};
+    constexpr double kNear = 0.35;  // a direction 70 degrees off is not told
+    std::array<std::size_t, 3> order{0, 1, 2};
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return std::abs(d[a]) > std::abs(d[b]); });
+    std::string letters;
+    for (const std::size_t a : order) {
+      if (std::abs(d[a]) > kNear) letters += kSides[a][d[a] > 0 ? 1 : 0];
+    }
+    return letters;
+  };
+  return {towards(right * -1), towards(right), towards(down * -1), towards(down)};
+}
+
+std::string place_text(Vec3 p) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x), p.y >= 0 ? 'P' : 'A', std::abs(p.y),
+                p.z >= 0 ? 'H' : 'F', std::abs(p.z));
+  return text;
+}
+
+double HuWindow::grey(double hu) const {
+  return std::clamp((hu - level + width / 2) * 255 / std::max(1.0, width), 0.0, 255.0);
+}
+
+void HuWindow::drag(double dx, double dy) {
+  constexpr double kHuPerPixel = 4;
+  width = std::clamp(width + dx * kHuPerPixel, 1.0, 10000.0);
+  level = std::clamp(level - dy * kHuPerPixel, -2000.0, 8000.0);
+}
+
+std::span<const GreyPreset> grey_presets() {
+  static constexpr GreyPreset kPresets[] = {{"Bone", {1000, 400}}, {"Soft tissue", {350, 40}}, {"Temporal bone", {4000, 700}}};
+  return kPresets;
 }
 
 double grey_of_hu(double hu) {
@@ -109,12 +167,11 @@ void write_text(Picture& onto, std::string_view text, int x, int y, int size, st
 }
 
 void write_directions(Picture& onto, const SliceView& view, int x, int y) {
-  const char* letters = view.plane == Plane::axial ? "RLAP" : view.plane == Plane::coronal ? "RLHF" : "APHF";  // left right top bottom
-  const auto letter = [&](int i) { return std::string_view(letters + i, 1); };
-  write_text(onto, letter(0), x + 6, y + view.height / 2, 16);
-  write_text(onto, letter(1), x + view.width - 18, y + view.height / 2, 16);
-  write_text(onto, letter(2), x + view.width / 2, y + 22, 16);
-  write_text(onto, letter(3), x + view.width / 2, y + view.height - 8, 16);
+  const std::array<std::string, 4> letters = edge_letters(view);
+  write_text(onto, letters[0], x + 6, y + view.height / 2, 16);
+  write_text(onto, letters[1], x + view.width - 18, y + view.height / 2, 16);
+  write_text(onto, letters[2], x + view.width / 2, y + 22, 16);
+  write_text(onto, letters[3], x + view.width / 2, y + view.height - 8, 16);
 }
 
 }  // namespace osteo

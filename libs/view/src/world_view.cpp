@@ -14,15 +14,16 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 #include <vtkTypeInt32Array.h>
-#include <vtkUnsignedCharArray.h>
 
 #include <cmath>
+#include <optional>
 
 #include "osteo/bone/plates.h"
 #include "osteo/bone/world_mesh.h"
 #include "osteo/io/vtk_data.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/structures_view.h"
 #include "osteo/view/visible.h"
 
 namespace osteo {
@@ -33,27 +34,12 @@ constexpr std::chrono::milliseconds kStill{300};
 
 }  // namespace
 
-WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : renderer_(renderer), structures_(structures) {
-  if (structures == nullptr) return;
-  const auto [mesh, whose] = structures->surface();
-  auto data = to_vtk(mesh);
-  vtkNew<vtkUnsignedCharArray> colours;
-  colours->SetNumberOfComponents(3);
-  for (const std::uint8_t s : whose) {
-    const auto c = structures->colour_of(s);
-    colours->InsertNextTuple3(std::round(255 * c[0]), std::round(255 * c[1]), std::round(255 * c[2]));
-  }
-  data->GetPointData()->SetScalars(colours);
-  structures_actor_ = make_bone_actor(data);
-  structures_actor_->GetMapper()->ScalarVisibilityOn();
-  renderer_->AddActor(structures_actor_);
-}
+WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : renderer_(renderer), structures_(structures) {}
 
 WorldView::~WorldView() {
   stop_ = true;
   if (coarsening_.valid()) coarsening_.wait();
   if (looking_.valid()) looking_.wait();
-  if (structures_actor_) renderer_->RemoveActor(structures_actor_);
   if (soft_actor_) renderer_->RemoveActor(soft_actor_);
   for (auto& [id, p] : plates_) {
     renderer_->RemoveActor(p.actor);
@@ -287,6 +273,8 @@ Picture draw_world(const World& world, SceneReaders& readers, const StructureMap
   window.window()->AddRenderer(renderer);
   set_up_scene(renderer);
   WorldView view(renderer, structures);
+  std::optional<StructuresView> at_risk;
+  if (structures != nullptr) at_risk.emplace(renderer, *structures);
   view.update(world, readers);
   if (soft != nullptr) view.update_soft(*soft);
   look_at(renderer, p.centre_mm, p.radius_mm, p.eye);

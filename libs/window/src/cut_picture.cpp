@@ -46,7 +46,7 @@ void draw_cut(const SliceView& view, const EditDocument& document, const CutLook
   const Vec3 across = f.index_from_world(view.world(1, 0)) - first, down = f.index_from_world(view.world(0, 1)) - first;
   const std::array<double, 3> edge{f.dims[0] - 0.5, f.dims[1] - 0.5, f.dims[2] - 0.5};
   const auto nx = static_cast<std::ptrdiff_t>(f.dims[0]), nxy = nx * f.dims[1];
-  const double black = look.level_hu - look.window_hu / 2, scale = 255 / std::max(1.0, look.window_hu);
+  const double black = look.hu.level - look.hu.width / 2, scale = 255 / std::max(1.0, look.hu.width);
   const std::span<const std::uint8_t> labels = document.labels();
 
   parallel_for(height, 16, 0, [&](std::size_t begin, std::size_t end) {

@@ -10,7 +10,7 @@
 namespace osteo {
 
 struct CutLook {
-  double window_hu = 1000, level_hu = 400;
+  HuWindow hu;
   bool outlines = true;
   int line_pixels = 1;
   std::optional<ThresholdEdit> live;  ///< a threshold that is being chosen: outlined instead of bone as it is

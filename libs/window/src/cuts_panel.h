@@ -1,35 +1,60 @@
-// The three linked cuts at the side of the window. Private to libs/window.
+// The three linked cuts at the side of the window, one of which can take the middle, and the list of structures. Private to libs/window.
 #pragma once
 #include <array>
 #include <optional>
 
-#include "osteo/grid/sampler.h"
+#include "cuts_control.h"
+#include "cuts_drawer.h"
+#include "osteo/bone/saw.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/view/structures_view.h"
 
 namespace osteo {
 
 class CutsPanel {
  public:
   struct Box {
-    float x, y, width, height;
+    float x = 0, y = 0, width = 0, height = 0;
+    [[nodiscard]] bool holds(float px, float py) const { return px >= x && px < x + width && py >= y && py < y + height; }
   };
   /// With an OpenGL context: makes and frees the textures.
   void create();
   void release();
-  /// Grey values of the bone; without them bone is one grey.
-  void set_hu(const SparseGrid& hu) { hu_.emplace(hu); }
-  /// Draws the cuts anew at the next frame; otherwise about seven times a second.
-  void renew() { age_s_ = 1e9; }
-  /// Between ImGui::NewFrame and Render.
-  void draw(Rehearsal& rehearsal, int tool, Box box);
+  /// CT values (the scan's, else what the case keeps, may be null) and density as the case has it, the finest first.
+  void set_case(const std::optional<Image>& scan, const SparseGrid* hu, const std::vector<SparseGrid>& bone);
+  /// A rehearsal has begun. `structures` (may be null) must live until the next call.
+  void begin(Rehearsal& rehearsal, StructuresView* structures);
+
+  /// Before the rest of a frame: where things lie, in a window of this size with a panel at its left.
+  void lay_out(int width, int height, float panel_width);
+  /// Where the bone is drawn: the middle, or the place of the cut that has taken it.
+  [[nodiscard]] const Box& scene() const { return scene_; }
+  /// Between ImGui::NewFrame and Render. `planned`: a saw cut that is being placed; null: none.
+  void draw(Rehearsal& rehearsal, const SawCut* planned);
+  [[nodiscard]] CutsControl& control() { return control_; }
+  [[nodiscard]] double last_ms() const { return drawer_.last_ms(); }
 
  private:
-  std::array<unsigned, 3> textures_{};
-  std::optional<GridSampler> hu_;
-  Vec3 cross_{};
-  double age_s_ = 1e9;
-  float span_mm_ = 90;
-  bool follow_drill_ = true;
+  void header(const Rehearsal& rehearsal);
+  void one_cut(int cut, const Rehearsal& rehearsal, const SawCut* planned);
+  void mouse_over(int cut, float corner_x, float corner_y);
+  void readout(const Rehearsal& rehearsal);
+  void list_structures(Rehearsal& rehearsal);
+  void take(Rehearsal& rehearsal);
+  void upload(DrawnCut cut);
+
+  CutsControl control_;
+  CutsDrawer drawer_;
+  StructuresView* structures_ = nullptr;
+  std::shared_ptr<const CtValues> ct_, ct_under_mouse_;  // one for each thread
+  std::vector<std::shared_ptr<const GridSampler>> before_;
+  std::array<unsigned, CutsControl::kCuts> textures_{};
+  std::array<std::optional<DrawnCut>, CutsControl::kCuts> drawn_;
+  CutsScene shown_;
+  std::array<Box, CutsControl::kCuts> boxes_;
+  Box column_, middle_, scene_;
+  float wished_width_ = 0;  // of the column; 0: as the window's width says
+  bool list_open_ = false, mouse_in_ = false;
 };
 
 }  // namespace osteo

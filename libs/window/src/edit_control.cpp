@@ -9,16 +9,14 @@
 namespace osteo {
 namespace {
 
-constexpr double kHuPerPixel = 4;
-
-// Away from who looks: along the normal of the cut.
-Vec3 normal_of(Plane plane) {
+// The way that slices are counted.
+Vec3 count_along(Plane plane) {
   return plane == Plane::axial ? Vec3{0, 0, 1} : plane == Plane::coronal ? Vec3{0, 1, 0} : Vec3{1, 0, 0};
 }
 
 // The index axis that runs along the normal.
 std::size_t axis_of(const Frame& frame, Plane plane) {
-  const Vec3 n = normal_of(plane);
+  const Vec3 n = count_along(plane);
   std::size_t best = 0;
   for (std::size_t a = 1; a < 3; ++a) {
     if (std::abs(dot(frame.direction.column[a], n)) > std::abs(dot(frame.direction.column[best], n))) best = a;
@@ -36,13 +34,6 @@ constexpr std::array<std::array<int, 3>, 8> kColours{
     {{255, 220, 60}, {90, 170, 255}, {90, 220, 130}, {240, 120, 200}, {255, 140, 80}, {120, 230, 230}, {190, 150, 255}, {200, 220, 110}}};
 
 }  // namespace
-
-std::string place_text(Vec3 p) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%c %.1f  %c %.1f  %c %.1f", p.x >= 0 ? 'L' : 'R', std::abs(p.x), p.y >= 0 ? 'P' : 'A', std::abs(p.y),
-                p.z >= 0 ? 'H' : 'F', std::abs(p.z));
-  return text;
-}
 
 std::string volume_text(double mm3) {
   return mm3 >= 1000 ? rounded(mm3 / 1000) + " cm3" : rounded(mm3) + " mm3";
@@ -81,11 +72,7 @@ EditControl::EditControl(EditDocument& document)
 void EditControl::resize(int view, int width, int height) {
   SliceView& v = views_[static_cast<std::size_t>(view)];
   if (v.width == width && v.height == height) return;
-  // The same millimetres fill the smaller side.
-  const double before = std::min(v.width, v.height), after = std::max(1, std::min(width, height));
-  v.mm_per_pixel *= before / after;
-  v.width = std::max(1, width);
-  v.height = std::max(1, height);
+  v.resize(width, height);
   redraw_ = true;
 }
 
@@ -127,7 +114,7 @@ void EditControl::scroll(int view, int slices) {
   const Frame& f = document_.ct().frame;
   const Plane plane = views_[static_cast<std::size_t>(view)].plane;
   const std::size_t a = axis_of(f, plane);
-  const double sign = dot(f.direction.column[a], normal_of(plane)) >= 0 ? 1 : -1;
+  const double sign = dot(f.direction.column[a], count_along(plane)) >= 0 ? 1 : -1;
   Vec3 x = f.index_from_world(cross_mm_);
   x[a] = std::clamp(std::round(x[a]) + sign * slices, 0.0, f.dims[a] - 1.0);
   cross_mm_ = f.world_from_index(x);
@@ -139,7 +126,7 @@ std::pair<int, int> EditControl::slice(int view) const {
   const Plane plane = views_[static_cast<std::size_t>(view)].plane;
   const std::size_t a = axis_of(f, plane);
   const int at = static_cast<int>(std::lround(f.index_from_world(cross_mm_)[a]));
-  return {dot(f.direction.column[a], normal_of(plane)) >= 0 ? at + 1 : f.dims[a] - at, f.dims[a]};
+  return {dot(f.direction.column[a], count_along(plane)) >= 0 ? at + 1 : f.dims[a] - at, f.dims[a]};
 }
 
 // --- mouse ----------------------------------------------------------------------------------------------------------------------------
@@ -149,12 +136,12 @@ bool EditControl::refuse_when_busy() {
   return busy();
 }
 
-void EditControl::press(EditPointer at, EditButton button) {
+void EditControl::press(SlicePointer at, SliceButton button) {
   last_ = at;
   if (at.view < 0 || at.view >= kView3D || held_) return;
   held_ = button;
   held_view_ = at.view;
-  if (button != EditButton::left) return;
+  if (button != SliceButton::left) return;
   const Vec3 p = world(at);
   switch (tool_) {
     case EditTool::ruler:
@@ -179,7 +166,7 @@ void EditControl::press(EditPointer at, EditButton button) {
   }
 }
 
-void EditControl::move(EditPointer at) {
+void EditControl::move(SlicePointer at) {
   const double dx = at.x - last_.x, dy = at.y - last_.y;
   last_ = at;
   under_mouse_ = at.view >= 0 && at.view < kView3D ? std::optional(world(at)) : std::nullopt;
@@ -190,26 +177,25 @@ void EditControl::move(EditPointer at) {
   }
   // A drag belongs to the view where it began.
   SliceView& v = views_[static_cast<std::size_t>(held_view_)];
-  if (*held_ == EditButton::middle) {
-    v.centre_mm += v.world(0, 0) - v.world(dx, dy);
+  if (*held_ == SliceButton::middle) {
+    v.drag(dx, dy);
     return;
   }
-  if (*held_ == EditButton::right) {
-    v.mm_per_pixel = std::clamp(v.mm_per_pixel * std::exp(-dy * 0.01), 0.005, 5.0);
+  if (*held_ == SliceButton::right) {
+    v.zoom_about(v.width / 2.0 - 0.5, v.height / 2.0 - 0.5, std::exp(dy * 0.01));
     return;
   }
   const Vec3 p = v.world(at.x, at.y);
   switch (tool_) {
     case EditTool::look:
-      window_hu = std::clamp(window_hu + dx * kHuPerPixel, 1.0, 10000.0);
-      level_hu = std::clamp(level_hu - dy * kHuPerPixel, -2000.0, 8000.0);
+      hu.drag(dx, dy);
       redraw_ = redraw_ || dx != 0 || dy != 0;
       break;
     case EditTool::ruler:
       if (ruler_mm) (*ruler_mm)[1] = p;
       break;
     case EditTool::box: {
-      const Vec3 n = normal_of(v.plane);
+      const Vec3 n = v.normal();
       for (std::size_t a = 0; a < 3; ++a) {
         if (n[a] != 0) continue;  // along the normal it stays as it is
         box_lo_mm[a] = std::round(std::min(box_from_mm_[a], p[a]) * 100) / 100;
@@ -226,14 +212,14 @@ void EditControl::move(EditPointer at) {
   }
 }
 
-void EditControl::release(EditPointer at, EditButton button) {
+void EditControl::release(SlicePointer at, SliceButton button) {
   if (held_ != button) return;
   move(at);
   held_.reset();
   if (document_.in_stroke()) told(document_.end_stroke());
 }
 
-void EditControl::wheel(EditPointer at, double notches) {
+void EditControl::wheel(SlicePointer at, double notches) {
   if (at.view < 0 || at.view >= kView3D || notches == 0) return;
   last_ = at;
   const bool brushes = tool_ == EditTool::brush || tool_ == EditTool::eraser;
@@ -242,19 +228,16 @@ void EditControl::wheel(EditPointer at, double notches) {
   } else if (at.control) {
     // What is under the mouse stays there.
     SliceView& v = views_[static_cast<std::size_t>(at.view)];
-    const Vec3 before = v.world(at.x, at.y);
-    v.mm_per_pixel = std::clamp(v.mm_per_pixel / std::pow(1.15, notches), 0.005, 5.0);
-    v.centre_mm += before - v.world(at.x, at.y);
+    v.zoom_about(at.x, at.y, std::pow(1.15, notches));
   } else {
     scroll(at.view, notches > 0 ? std::max(1, static_cast<int>(notches)) : std::min(-1, static_cast<int>(notches)));
   }
 }
 
-void EditControl::double_click(EditPointer at) {
+void EditControl::double_click(SlicePointer at) {
   if (at.view < 0) return;
   if (at.control) {
-    window_hu = grey_presets()[0].window_hu;
-    level_hu = grey_presets()[0].level_hu;
+    hu = grey_presets()[0].hu;
   } else if (tool_ != EditTool::piece && tool_ != EditTool::brush && tool_ != EditTool::eraser) {
     enlarged_ = enlarged_ < 0 ? at.view : -1;
   }
@@ -423,8 +406,7 @@ bool EditControl::key(const EditKeyRow& k) {
       return true;
     case EditKey::preset: {
       const GreyPreset& p = grey_presets()[static_cast<std::size_t>(k.value)];
-      window_hu = p.window_hu;
-      level_hu = p.level_hu;
+      hu = p.hu;
       redraw_ = true;
       return true;
     }

@@ -10,20 +10,12 @@
 #include "edit_worker.h"
 #include "osteo/edit/document.h"
 #include "osteo/view/slices.h"
+#include "slice_pointer.h"
 
 namespace osteo {
 
 /// Views 0 to 2 are the slices in the order of `Plane`; 3 is the picture in 3D.
 inline constexpr int kView3D = 3;
-
-enum class EditButton { left, right, middle };
-
-/// The mouse over a view, in pixels from its upper left corner; x and y to the right and down.
-struct EditPointer {
-  int view = -1;  ///< none: beside all
-  double x = 0, y = 0;
-  bool shift = false, control = false;
-};
 
 class EditControl {
  public:
@@ -42,19 +34,19 @@ class EditControl {
   void scroll(int view, int slices);
   /// Number of the slice from 1 on, and how many there are.
   [[nodiscard]] std::pair<int, int> slice(int view) const;
-  double window_hu = 1000, level_hu = 400;
+  HuWindow hu;
   bool show_cross = true, show_outlines = true, show_help = false;
 
   /// Of the picture in 3D: fewer where triangles are drawn without a graphics card.
   std::size_t preview_voxels = 3'000'000;
 
   // --- mouse --------------------------------------------------------------------------------------------------------------------------
-  void press(EditPointer at, EditButton button);
+  void press(SlicePointer at, SliceButton button);
   /// Also without a button.
-  void move(EditPointer at);
-  void release(EditPointer at, EditButton button);
-  void wheel(EditPointer at, double notches);
-  void double_click(EditPointer at);
+  void move(SlicePointer at);
+  void release(SlicePointer at, SliceButton button);
+  void wheel(SlicePointer at, double notches);
+  void double_click(SlicePointer at);
   /// Where the mouse is in the scan, when it is over a slice.
   [[nodiscard]] std::optional<Vec3> under_mouse() const { return under_mouse_; }
   /// "L 12.3  P 4.0  H 31.5 mm   345 HU   bone, facial nerve"; empty beside the slices.
@@ -112,7 +104,7 @@ class EditControl {
   [[nodiscard]] bool take_redraw() { return std::exchange(redraw_, false); }
 
  private:
-  [[nodiscard]] Vec3 world(EditPointer at) const { return views_[static_cast<std::size_t>(at.view)].world(at.x, at.y); }
+  [[nodiscard]] Vec3 world(SlicePointer at) const { return views_[static_cast<std::size_t>(at.view)].world(at.x, at.y); }
   void follow_cross();
   [[nodiscard]] bool refuse_when_busy();
   void ask_preview();
@@ -124,8 +116,8 @@ class EditControl {
   int enlarged_ = -1;
   Vec3 cross_mm_;
   std::optional<Vec3> under_mouse_;
-  EditPointer last_;
-  std::optional<EditButton> held_;
+  SlicePointer last_;
+  std::optional<SliceButton> held_;
   int held_view_ = -1;
   Vec3 box_from_mm_;
   EditTool tool_ = EditTool::look;
@@ -135,8 +127,6 @@ class EditControl {
   bool hidden_changed_ = false, redraw_ = true;
 };
 
-/// "L 12.3  P 4.0  H 31.5": the sides that LPS coordinates lie on.
-[[nodiscard]] std::string place_text(Vec3 lps_mm);
 /// "12.3 cm3", "45 mm3".
 [[nodiscard]] std::string volume_text(double mm3);
 

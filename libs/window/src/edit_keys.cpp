@@ -76,8 +76,6 @@ constexpr EditKeyRow kRows[] = {
     {'Q', EditKey::close, 0, With::control},
 };
 
-constexpr GreyPreset kPresets[] = {{"Bone", 1000, 400}, {"Soft tissue", 350, 40}, {"Temporal bone", 4000, 700}};
-
 }  // namespace
 
 const char* edit_tool_name(EditTool tool) {
@@ -131,10 +129,6 @@ std::string edit_help_table() {
   std::string text = "| mouse, key | what it does |\n|---|---|\n";
   for (const EditHelpLine& l : edit_help_lines()) text += "| " + std::string(l.keys) + " | " + l.text + " |\n";
   return text;
-}
-
-std::span<const GreyPreset> grey_presets() {
-  return kPresets;
 }
 
 }  // namespace osteo

@@ -52,11 +52,4 @@ struct EditHelpLine {
 /// The help as a table in Markdown, as docs/edit.md has it.
 [[nodiscard]] std::string edit_help_table();
 
-/// A window of grey values.
-struct GreyPreset {
-  const char* name;
-  double window_hu, level_hu;
-};
-[[nodiscard]] std::span<const GreyPreset> grey_presets();
-
 }  // namespace osteo

@@ -45,7 +45,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
   tools(control, scale);
   options(control);
   heading("Grey values");
-  ImGui::Text("window %.0f, level %.0f HU", control.window_hu, control.level_hu);
+  ImGui::Text("window %.0f, level %.0f HU", control.hu.width, control.hu.level);
   for (std::size_t i = 0; i < grey_presets().size(); ++i) {
     const GreyPreset& p = grey_presets()[i];
     if (i > 0) ImGui::SameLine();
@@ -55,7 +55,7 @@ EditPanel::Wishes EditPanel::draw(EditControl& control, float width, float heigh
       control.key(row);
     }
     if (ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s: window %.0f, level %.0f (F%d)", p.name, p.window_hu, p.level_hu, static_cast<int>(i) + 2);
+      ImGui::SetTooltip("%s: window %.0f, level %.0f (F%d)", p.name, p.hu.width, p.hu.level, static_cast<int>(i) + 2);
   }
   structures(control, scale);
   ImGui::EndChild();

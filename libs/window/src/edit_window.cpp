@@ -248,8 +248,8 @@ class EditWindow {
     fitted_ = true;
   }
 
-  [[nodiscard]] EditPointer pointer(double x, double y, int view) const {
-    EditPointer p{view, 0, 0, shift_, control_key_};
+  [[nodiscard]] SlicePointer pointer(double x, double y, int view) const {
+    SlicePointer p{view, 0, 0, shift_, control_key_};
     if (view >= 0) {
       p.x = x - boxes_[static_cast<std::size_t>(view)].x;
       p.y = y - boxes_[static_cast<std::size_t>(view)].y;
@@ -268,17 +268,17 @@ class EditWindow {
     const ImGuiIO& io = ImGui::GetIO();
     for (const Event& e : std::exchange(events_, {})) {
       const int view = dragging_ >= 0 ? dragging_ : control_.show_help && io.WantCaptureMouse ? -1 : view_at(e.x, e.y);
-      const EditPointer at = pointer(e.x, e.y, view);
-      const EditButton button = e.code == GLFW_MOUSE_BUTTON_LEFT    ? EditButton::left
-                                : e.code == GLFW_MOUSE_BUTTON_RIGHT ? EditButton::right
-                                                                    : EditButton::middle;
+      const SlicePointer at = pointer(e.x, e.y, view);
+      const SliceButton button = e.code == GLFW_MOUSE_BUTTON_LEFT    ? SliceButton::left
+                                 : e.code == GLFW_MOUSE_BUTTON_RIGHT ? SliceButton::right
+                                                                     : SliceButton::middle;
       switch (e.kind) {
         case Event::Kind::move:
           if (dragging_ == kView3D) {
             const double dx = e.x - drag_x_, dy = e.y - drag_y_;
-            if (drag_button_ == EditButton::left) scene_->turn(dx, dy);
-            if (drag_button_ == EditButton::right) scene_->zoom(std::exp(-dy * 0.01));
-            if (drag_button_ == EditButton::middle) scene_->shift(dx, dy);
+            if (drag_button_ == SliceButton::left) scene_->turn(dx, dy);
+            if (drag_button_ == SliceButton::right) scene_->zoom(std::exp(-dy * 0.01));
+            if (drag_button_ == SliceButton::middle) scene_->shift(dx, dy);
             drag_x_ = e.x;
             drag_y_ = e.y;
           } else {
@@ -288,7 +288,7 @@ class EditWindow {
         case Event::Kind::press: {
           if (view < 0) break;
           const Clock::time_point now = Clock::now();
-          const bool twice = button == EditButton::left && std::chrono::duration<double>(now - last_press_).count() < 0.4 &&
+          const bool twice = button == SliceButton::left && std::chrono::duration<double>(now - last_press_).count() < 0.4 &&
                              std::abs(e.x - press_x_) < 6 && std::abs(e.y - press_y_) < 6;
           last_press_ = twice ? Clock::time_point() : now;
           press_x_ = drag_x_ = e.x;
@@ -349,8 +349,7 @@ class EditWindow {
   void views() {
     const bool redraw = control_.take_redraw();
     CutLook look;
-    look.window_hu = control_.window_hu;
-    look.level_hu = control_.level_hu;
+    look.hu = control_.hu;
     look.outlines = control_.show_outlines;
     look.line_pixels = scale_ > 1.4F ? 2 : 1;
     look.live = control_.live();
@@ -492,7 +491,7 @@ class EditWindow {
   double mouse_x_ = 0, mouse_y_ = 0, press_x_ = 0, press_y_ = 0, drag_x_ = 0, drag_y_ = 0;
   Clock::time_point last_press_;
   int dragging_ = -1;
-  EditButton drag_button_ = EditButton::left;
+  SliceButton drag_button_ = SliceButton::left;
   bool shift_ = false, control_key_ = false, fitted_ = false;
   bool quit_ = false, wants_close_ = false, asking_ = false, saving_ = false, close_after_save_ = false;
   std::uint64_t saving_version_ = 0, pictures_ = 0;

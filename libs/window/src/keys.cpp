@@ -58,6 +58,8 @@ constexpr Key kKeys[] = {
     {'H', Command::help},
     {'Q', Command::quit},
     {'J', Command::quality},
+    {'W', Command::cut_in_middle},
+    {'G', Command::cuts_along_tool},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -103,7 +105,14 @@ const std::vector<HelpLine>& help_lines() {
                                               {"N", "sound on and off", {sound}},
                                               {"F1, H", "shows this, and hides it", {help}},
                                               {"Q", "save and close", {quit}},
-                                              {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}}};
+                                              {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
+                                              {"W", "a cut takes the middle, and back", {cut_in_middle}},
+                                              {"G", "cuts along the tool, or along the body", {cuts_along_tool}},
+                                              {"cuts: wheel, Ctrl-wheel", "scrolls; nearer and farther", {}},
+                                              {"cuts: click, Shift-move", "looks there in all three", {}},
+                                              {"cuts: left drag", "measures", {}},
+                                              {"cuts: right drag, right click", "window and level; as they were", {}},
+                                              {"cuts: middle drag, double click", "moves it; takes the middle, and back", {}}};
   return lines;
 }
 

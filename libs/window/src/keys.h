@@ -36,6 +36,8 @@ enum class Command {
   home,
   sound,
   quality,
+  cut_in_middle,
+  cuts_along_tool,
   help,
   quit,
 };

@@ -37,6 +37,7 @@
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/structures_view.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
 #include "scene_painter.h"
@@ -49,7 +50,7 @@
 namespace osteo {
 namespace {
 
-constexpr int kPanelWidth = 270, kSliceWidth = 290;
+constexpr int kPanelWidth = 270;
 constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 
 class RehearsalWindow {
@@ -63,7 +64,7 @@ class RehearsalWindow {
         approval_ended_(options.approval_ended),
         state_file_(options.state_file),
         device_name_(options.device) {
-    if (hu != nullptr) cuts_.set_hu(*hu);
+    cuts_.set_case(options.ct, hu, options.bone);
     open(options);
     painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
     painter_->quality().want(options.quality);
@@ -78,6 +79,7 @@ class RehearsalWindow {
   ~RehearsalWindow() {
     glfwMakeContextCurrent(window_);
     cuts_.release();
+    structures_.reset();
     tools_.reset();
     world_view_.reset();
     render_window_->Finalize();
@@ -149,7 +151,9 @@ class RehearsalWindow {
     world_view_ = std::make_unique<WorldView>(renderer_, rehearsal.structures());
     rehearsal.look([&](const World& world, SceneReaders& readers) { world_view_->update(world, readers); });
     if (!tools_) tools_ = std::make_unique<SceneTools>(renderer_);
-    cuts_.renew();
+    if (!structures_ && rehearsal.structures() != nullptr)  // the same in all sessions
+      structures_ = std::make_unique<StructuresView>(renderer_, *rehearsal.structures());
+    cuts_.begin(rehearsal, structures_.get());
   }
 
   void look_from(Vec3 eye) { look_at(renderer_, control_.centre_mm(), 0.8 * control_.radius_mm(), normalized(eye)); }
@@ -215,6 +219,7 @@ class RehearsalWindow {
       return;
     }
     begin_picture();
+    cuts_.lay_out(width_, height_, kPanelWidth);
     if (control_.failure()) {
       tell_failure();
     } else {
@@ -237,8 +242,7 @@ class RehearsalWindow {
     if (control_.failure()) return;
     Rehearsal& now = control_.rehearsal();
     draw_instrument(drawn_[0], control_.tool());
-    cuts_.draw(now, control_.tool(),
-               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
+    cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
     if (show_help_) draw_help(show_help_, width_);
     now.look([&](const World& world, SceneReaders& readers) {
       world_view_->update(world, readers);
@@ -270,10 +274,14 @@ class RehearsalWindow {
   void end_picture() {
     ImGui::Render();
     render_window_->SetSize(width_, height_);
-    const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
-    renderer_->SetViewport(left, 0, right, 1);
+    const CutsPanel::Box& scene = cuts_.scene();
+    // Mouse and scene agree in the window's own pixels.
+    const auto of = [](float a, int b) { return static_cast<double>(a) / b; };
+    renderer_->SetViewport(of(scene.x, width_), 1 - of(scene.y + scene.height, height_), of(scene.x + scene.width, width_),
+                           1 - of(scene.y, height_));
+    const auto whole = [](float x) { return static_cast<int>(std::lround(x)); };
+    const SceneBox box{whole(scene.x), height_ - whole(scene.y + scene.height), std::max(1, whole(scene.width)), std::max(1, whole(scene.height))};
     renderer_->ResetCameraClippingRange();
-    const SceneBox box{kPanelWidth, 0, width_ - kPanelWidth - kSliceWidth, height_};
     const bool settled = !world_view_ || control_.failure() || world_view_->rest(box.width, box.height, painter_->coarse());
     const bool shows = painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData());
     if (!shows) return painter_->wait();
@@ -353,8 +361,7 @@ class RehearsalWindow {
     HandTools& tools = control_.tools();
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
-    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
-                         m.y < static_cast<float>(height_) && !show_help_;
+    const bool in_view = cuts_.scene().holds(m.x, m.y) && !show_help_;
     vtkCamera* const camera = renderer_->GetActiveCamera();
     if (in_view && !io.WantCaptureMouse) {
       if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
@@ -419,6 +426,10 @@ class RehearsalWindow {
     if (command == Command::quality) {
       QualityChoice& q = painter_->quality();
       q.want(static_cast<Quality>((static_cast<int>(q.wish()) + 1) % 4));
+    if (command == Command::cut_in_middle) cuts_.control().enlarge_or_back();
+    if (command == Command::cuts_along_tool) {
+      const bool along = cuts_.control().planes() == CutsControl::Planes::tool;
+      cuts_.control().take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
     }
     if (command == Command::quit) quit_ = true;
   }
@@ -535,6 +546,9 @@ class RehearsalWindow {
     state.sucking = control_.sucking();
     state.washing = control_.washing();
     state.sound = sound_.on();
+    state.cut_in_middle = cuts_.control().enlarged();
+    state.cuts_along_tool = cuts_.control().planes() == CutsControl::Planes::tool;
+    state.cuts_ms = cuts_.last_ms();
     state.hand = static_cast<int>(control_.tools().tool());
     state.cut = control_.tools().cut();
     state.plate = control_.tools().plate_grip();
@@ -571,6 +585,7 @@ class RehearsalWindow {
   std::array<DrawnHand, kMostHands> drawn_;
   std::unique_ptr<ScenePainter> painter_;
   std::unique_ptr<WorldView> world_view_;
+  std::unique_ptr<StructuresView> structures_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
   std::string device_name_;

@@ -21,6 +21,9 @@ struct WindowState {
   std::filesystem::path session;
   bool leading = false, drill_latched = false, help = false, sucking = false, washing = false, sound = false;
   int hand = 0;  // SceneTools::Tool
+  int cut_in_middle = -1;
+  bool cuts_along_tool = false;
+  double cuts_ms = 0;  // that drawing cuts took last
   SawCut cut;
   RigidTransform plate;
   Vec3 eye, centre_mm, goal_mm;

@@ -21,16 +21,16 @@ struct Editor {
     control.fit();
   }
   // Where a point lies in a view.
-  [[nodiscard]] EditPointer at(int view, Vec3 mm, bool shift = false, bool ctrl = false) const {
+  [[nodiscard]] SlicePointer at(int view, Vec3 mm, bool shift = false, bool ctrl = false) const {
     const auto p = control.view(view).pixel(mm);
     return {view, p[0], p[1], shift, ctrl};
   }
-  void click(EditPointer p) {
+  void click(SlicePointer p) {
     control.move(p);
-    control.press(p, EditButton::left);
-    control.release(p, EditButton::left);
+    control.press(p, SliceButton::left);
+    control.release(p, SliceButton::left);
   }
-  void drag(EditPointer from, EditPointer to, EditButton button = EditButton::left) {
+  void drag(SlicePointer from, SlicePointer to, SliceButton button = SliceButton::left) {
     control.move(from);
     control.press(from, button);
     control.move(to);
@@ -121,10 +121,10 @@ TEST(EditControl, CrosshairLinksTheViewsZoomKeepsWhatIsUnderTheMouse) {
   EXPECT_LT(e.control.view(1).mm_per_pixel, before);
   EXPECT_LT(length(e.control.view(1).world(90, 70) - under), 1e-9);
   const Vec3 centre = e.control.view(1).centre_mm;
-  e.drag({1, 100, 100}, {1, 110, 105}, EditButton::middle);
+  e.drag({1, 100, 100}, {1, 110, 105}, SliceButton::middle);
   EXPECT_NEAR(length(e.control.view(1).centre_mm - centre), std::hypot(10, 5) * e.control.view(1).mm_per_pixel, 1e-9);
   const double scale = e.control.view(1).mm_per_pixel;
-  e.drag({1, 100, 100}, {1, 100, 120}, EditButton::right);
+  e.drag({1, 100, 100}, {1, 100, 120}, SliceButton::right);
   EXPECT_LT(e.control.view(1).mm_per_pixel, scale);
   e.control.fit();
   EXPECT_NEAR(e.control.view(1).mm_per_pixel, before, 1e-9);
@@ -133,15 +133,15 @@ TEST(EditControl, CrosshairLinksTheViewsZoomKeepsWhatIsUnderTheMouse) {
 TEST(EditControl, WindowAndLevelByDragPresetsAndBack) {
   Editor e;
   e.drag({0, 100, 100}, {0, 150, 80});
-  EXPECT_DOUBLE_EQ(e.control.window_hu, 1200);
-  EXPECT_DOUBLE_EQ(e.control.level_hu, 480);
+  EXPECT_DOUBLE_EQ(e.control.hu.width, 1200);
+  EXPECT_DOUBLE_EQ(e.control.hu.level, 480);
   for (int p = 0; p < 3; ++p) {
     EXPECT_TRUE(e.control.key(*find_edit_key(291 + p, false, false)));
-    EXPECT_EQ(e.control.window_hu, grey_presets()[static_cast<std::size_t>(p)].window_hu);
-    EXPECT_EQ(e.control.level_hu, grey_presets()[static_cast<std::size_t>(p)].level_hu);
+    EXPECT_EQ(e.control.hu.width, grey_presets()[static_cast<std::size_t>(p)].hu.width);
+    EXPECT_EQ(e.control.hu.level, grey_presets()[static_cast<std::size_t>(p)].hu.level);
   }
   e.control.double_click({0, 100, 100, false, true});
-  EXPECT_EQ(e.control.window_hu, 1000);
+  EXPECT_EQ(e.control.hu.width, 1000);
   EXPECT_EQ(e.control.enlarged(), -1);
   e.control.double_click({1, 100, 100});
   EXPECT_EQ(e.control.enlarged(), 1);
@@ -189,7 +189,7 @@ TEST(EditControl, BrushAndEraserDrawWhereTheMouseGoesAndUndoTakesItBack) {
   EXPECT_TRUE(e.document.bone().at(36, 25, 20));
   // Another tool in the middle of a stroke ends it.
   e.control.take(EditTool::brush);
-  e.control.press(e.at(0, b), EditButton::left);
+  e.control.press(e.at(0, b), SliceButton::left);
   EXPECT_TRUE(e.document.in_stroke());
   e.control.take(EditTool::look);
   EXPECT_FALSE(e.document.in_stroke());

@@ -44,8 +44,10 @@ class StructureMap {
   /// Of the structures that have voxels, ascending.
   [[nodiscard]] const std::vector<std::uint8_t>& values() const { return values_; }
   [[nodiscard]] const std::vector<Structure>& structures() const { return structures_; }
-  /// The faces of all structures, closed, and for each point which it belongs to.
-  [[nodiscard]] std::pair<TriMesh, std::vector<std::uint8_t>> surface() const;
+  /// The face that distances are measured from, closed; `number` in values(). What is drawn is smoother (view/structures_view.h).
+  [[nodiscard]] const TriMesh& face(std::size_t number) const { return parts_[number].face; }
+  /// Of the labels, the finest and the coarsest of the three.
+  [[nodiscard]] std::array<double, 2> label_spacing_mm() const { return spacing_mm_; }
   /// Red, green, blue, 0 to 1: the map's own, or one of a fixed row.
   [[nodiscard]] std::array<double, 3> colour_of(std::uint8_t structure) const;
   [[nodiscard]] std::string name_of(std::uint8_t structure) const;  ///< "structure 3" where the map has no name
@@ -72,6 +74,7 @@ class StructureMap {
   std::vector<Part> parts_;  // in the order of values_
   std::vector<std::uint8_t> values_;
   double reach_mm_;
+  std::array<double, 2> spacing_mm_;
   std::vector<Structure> structures_;
 };
 

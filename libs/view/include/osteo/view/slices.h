@@ -1,6 +1,10 @@
 // Flat cuts through a volume as pictures, and drawing on pictures.
 #pragma once
+#include <array>
 #include <functional>
+#include <optional>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "osteo/data/data.h"
@@ -11,18 +15,59 @@ namespace osteo {
 /// coronal: seen from the front, left on the right. sagittal: front to the left.
 enum class Plane : int { axial, coronal, sagittal };
 
+/// Directions of a picture, unit and at right angles. What is farther from who looks lies along cross(right, down).
+struct SliceAxes {
+  Vec3 right, down;
+};
+[[nodiscard]] SliceAxes axes_of(Plane plane);
+
 struct SliceView {
   Plane plane = Plane::axial;
   Vec3 through_mm;  ///< the point that the cut passes through
   Vec3 centre_mm;   ///< what lies at the centre of the picture
   double mm_per_pixel = 1;
   int width = 256, height = 256;
+  std::optional<SliceAxes> oblique = {};  ///< in place of the plane's
 
+  [[nodiscard]] SliceAxes axes() const { return oblique ? *oblique : axes_of(plane); }
+  /// Unit, away from who looks.
+  [[nodiscard]] Vec3 normal() const;
   /// The world point at a pixel (its centre), y downwards.
   [[nodiscard]] Vec3 world(double px, double py) const;
   /// The pixel of a world point projected onto the cut.
   [[nodiscard]] std::array<double, 2> pixel(Vec3 world_mm) const;
+
+  /// What lies at a pixel stays there; millimetres a pixel are divided by `factor` and kept between 0.005 and 5.
+  void zoom_about(double px, double py, double factor);
+  /// What lies at a pixel goes with it.
+  void drag(double dx, double dy);
+  /// The same millimetres fill the smaller side. Sizes below 1 count as 1.
+  void resize(int new_width, int new_height);
 };
+
+/// The sides of the body that a cut's left, right, top and bottom edge lie on: "R", of an oblique cut up to three letters, the nearest
+/// direction first ("AR"). R L A P H F.
+[[nodiscard]] std::array<std::string, 4> edge_letters(const SliceView& view);
+/// "L 12.3  P 4.0  H 31.5": the sides that LPS coordinates lie on.
+[[nodiscard]] std::string place_text(Vec3 lps_mm);
+
+/// Which CT values are shown between black and white.
+struct HuWindow {
+  double width = 1000, level = 400;
+  /// 0 to 255.
+  [[nodiscard]] double grey(double hu) const;
+  /// Of a mouse that is dragged: to the right wider, upwards brighter things come into view (a higher level). 4 HU a pixel; width 1 to
+  /// 10000, level -2000 to 8000.
+  void drag(double dx, double dy);
+  friend bool operator==(const HuWindow&, const HuWindow&) = default;
+};
+
+struct GreyPreset {
+  const char* name;
+  HuWindow hu;
+};
+/// Bone, soft tissue, temporal bone.
+[[nodiscard]] std::span<const GreyPreset> grey_presets();
 
 /// Grey value 0 to 255 at a point of the world.
 using GreyAt = std::function<double(Vec3)>;

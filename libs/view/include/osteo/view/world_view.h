@@ -1,4 +1,4 @@
-// A scene that is operated on, in a VTK renderer: bodies, plates, structures at risk, dust.
+// A scene that is operated on, in a VTK renderer: bodies, plates, dust.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -17,7 +17,7 @@ namespace osteo {
 
 class WorldView {
  public:
-  /// `structures` (may be null) must outlive this.
+  /// `structures` (may be null) tint thin bone over them; must outlive this. They are drawn by StructuresView.
   WorldView(vtkRenderer* renderer, const StructureMap* structures);
   ~WorldView();
   WorldView(const WorldView&) = delete;
@@ -56,7 +56,7 @@ class WorldView {
   };
   vtkRenderer* renderer_;
   const StructureMap* structures_;
-  vtkSmartPointer<vtkActor> structures_actor_, soft_actor_;
+  vtkSmartPointer<vtkActor> soft_actor_;
   vtkSmartPointer<vtkPolyData> soft_data_;
   std::uint64_t soft_version_ = 0;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;

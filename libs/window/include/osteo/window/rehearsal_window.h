@@ -4,9 +4,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "osteo/base/error.h"
 #include "osteo/data/sparse_grid.h"
+#include "osteo/data/volume.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/view/quality.h"
@@ -24,6 +26,8 @@ struct WindowOptions {
   VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
   std::string approval;              ///< of the case, in words; empty: unknown
   bool approval_ended = false;       ///< by a later change: said in another colour
+  std::vector<SparseGrid> bone;      ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
+  std::optional<Image> ct;           ///< the scan of the case, for its cuts; none: they show what the case keeps of it
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
