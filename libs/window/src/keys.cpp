@@ -11,11 +11,19 @@ enum : int {
   kSpace = 32,
   kEscape = 256,
   kEnter = 257,
+  kBackspace = 259,
   kDown = 264,
   kUp = 265,
   kHome = 268,
   kF1 = 290,
   kF5 = 294,
+  kF6 = 295,
+  kF7 = 296,
+  kF8 = 297,
+  kKeypad2 = 322,
+  kKeypad4 = 324,
+  kKeypad6 = 326,
+  kKeypad8 = 328,
   kKeypadEnter = 335,
 };
 
@@ -57,6 +65,22 @@ constexpr Key kKeys[] = {
     {kF1, Command::help},
     {'H', Command::help},
     {'Q', Command::quit},
+    {'[', Command::magnify, Key::When::pressed, -1},
+    {']', Command::magnify, Key::When::pressed, 1},
+    {',', Command::focus, Key::When::repeated, -1},
+    {'.', Command::focus, Key::When::repeated, 1},
+    {'/', Command::autofocus},
+    {'W', Command::look_there},
+    {'G', Command::look_at_drill},
+    {'O', Command::guide_camera, Key::When::held},
+    {kF6, Command::bookmark, Key::When::pressed, 0},
+    {kF7, Command::bookmark, Key::When::pressed, 1},
+    {kF8, Command::bookmark, Key::When::pressed, 2},
+    {kBackspace, Command::camera_back},
+    {kKeypad4, Command::orbit_left, Key::When::held},
+    {kKeypad6, Command::orbit_right, Key::When::held},
+    {kKeypad8, Command::orbit_up, Key::When::held},
+    {kKeypad2, Command::orbit_down, Key::When::held},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -81,9 +105,9 @@ const std::vector<HelpLine>& help_lines() {
                                               {"U", "lifts the drill out of the bone, drill off", {lift}},
                                               {"wheel, Up, Down, Shift-drag", "moves it deeper or back", {deeper, back}},
                                               {"left button, Space", "drills while held; Space: on and off", {drill}},
-                                              {"right drag", "turns the view", {}},
+                                              {"right drag", "turns the view about its focus; with Shift rolls it", {}},
                                               {"middle drag", "shifts the view", {}},
-                                              {"Ctrl-wheel", "nearer and farther", {}},
+                                              {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
                                               {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
                                               {"V, I", "a sucker, or water, beside the burr", {suck, wash}},
@@ -101,7 +125,15 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Home", "view from the left", {home}},
                                               {"N", "sound on and off", {sound}},
                                               {"F1, H", "shows this, and hides it", {help}},
-                                              {"Q", "save and close", {quit}}};
+                                              {"Q", "save and close", {quit}},
+                                              {"[, ]", "magnification, by its steps", {magnify}},
+                                              {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
+                                              {"W", "looks at the bone under the mouse", {look_there}},
+                                              {"G", "looks at the drill; with Shift along it", {look_at_drill}},
+                                              {"O", "mouse or device move the camera; with Shift turn it", {guide_camera}},
+                                              {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
+                                              {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
+                                              {"Backspace", "takes back the camera's last move", {camera_back}}};
   return lines;
 }
 

@@ -37,6 +37,18 @@ enum class Command {
   sound,
   help,
   quit,
+  magnify,  // value: up or down
+  focus,    // value: deeper or back
+  autofocus,
+  look_there,
+  look_at_drill,
+  guide_camera,
+  bookmark,  // value: which
+  camera_back,
+  orbit_left,
+  orbit_right,
+  orbit_up,
+  orbit_down,
 };
 
 struct Key {

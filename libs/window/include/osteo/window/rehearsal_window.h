@@ -6,6 +6,7 @@
 #include <string>
 
 #include "osteo/base/error.h"
+#include "osteo/camera/stereo.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
@@ -17,11 +18,12 @@ struct WindowOptions {
   int width = 1360, height = 860;  ///< made smaller where the screen is
   std::string title;
   int tool = 3;
-  bool from_case = true;             ///< how the first session begins
-  std::string device = "mouse";      ///< as the panel names it
-  VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
-  std::string approval;              ///< of the case, in words; empty: unknown
-  bool approval_ended = false;       ///< by a later change: said in another colour
+  bool from_case = true;         ///< how the first session begins
+  std::string device = "mouse";  ///< as the panel names it
+  VerdictSummary scan;           ///< what the import found in the scan; status empty: unknown
+  std::string approval;          ///< of the case, in words; empty: unknown
+  bool approval_ended = false;   ///< by a later change: said in another colour
+  StereoParams stereo;
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
@@ -30,6 +32,15 @@ struct HandView {
   Vec3 eye;   ///< from the bone towards who looks
   Vec3 axis;  ///< along the handle
   int tool = 3;
+};
+
+/// Hardware for the camera, as it is now. Lengths, pushes and turns in the device's own right, up and towards the user.
+struct CameraDevices {
+  bool pedal = false;             ///< its brake is released, as by the key
+  std::optional<Vec3> hand_mm;    ///< of an arm whose hand is lent to the camera
+  std::optional<Vec3> hand_axis;  ///< its handle
+  std::optional<Vec3> push;       ///< deflection of a puck that is not the drill now, 0 to 1
+  Vec3 turn;                      ///< and its twist
 };
 
 /// What the window asks of whoever runs the rehearsal. After save, and after anything that throws, nothing runs.
@@ -44,6 +55,9 @@ struct WindowActions {
   std::function<std::filesystem::path()> folder;
   /// Why the session that runs has to end now (its recording has): the window saves it and says so.
   std::function<std::optional<Error>()> failure;
+  /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves the camera. May be
+  /// empty.
+  std::function<CameraDevices(bool lend)> camera;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };
