@@ -3,6 +3,7 @@
 #include <string>
 
 #include "osteo/bone/burr.h"
+#include "osteo/camera/stereo.h"
 #include "osteo/haptics/contact.h"
 
 namespace osteo {
@@ -38,6 +39,9 @@ struct WindowFlags {
   bool sound = true;
   double volume = 0.7;
   bool alarms = false;
+  StereoMode stereo = StereoMode::off;
+  double stereo_base = 22;
+  std::string experiment;
   bool require_approved = false;
   int width = 1360;
   int height = 860;
@@ -63,6 +67,10 @@ struct WindowFlags {
           p.sound);
     visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);
     visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
+    visit({"stereo", "in the window, a picture for each eye, put together for the screen; docs/camera.md"}, p.stereo);
+    visit({"stereo_base", "between the eyes; they agree on what lies in the focus", "mm", 0, 65}, p.stereo_base);
+    visit({"experiment", "in the window, 'camera': views to bring the camera to, timed, as CSV in the session's folder (empty: none)"},
+          p.experiment);
     visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);

@@ -59,7 +59,10 @@ void ScopeControl::begin(Kind kind) {
     if (view_.upright) level(view_);
     kind_.reset();
   }
-  if (kind_ != kind) keep();
+  if (kind_ != kind) {
+    keep();
+    ++moves_[static_cast<std::size_t>(kind)];
+  }
   kind_ = kind;
   quiet_s_ = 0;
 }
@@ -132,6 +135,7 @@ void ScopeControl::drive(Vec3 shift, Vec3 turn, double seconds) {
 }
 
 void ScopeControl::fly(const ScopeView& to) {
+  ++moves_[static_cast<std::size_t>(Kind::flight)];
   arm.brake();
   kind_.reset();
   if (flights) {

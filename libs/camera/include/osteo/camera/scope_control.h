@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <string_view>
 
 #include "osteo/base/param.h"
 #include "osteo/camera/microscope.h"
@@ -43,6 +44,13 @@ class ScopeArm {
   ScopeRates velocity_;
 };
 
+/// Kinds of moves of the camera.
+enum class ScopeMove : int { orbit, pan, zoom, focus, roll, working_distance, guide, flight };
+template <>
+struct EnumNames<ScopeMove> {
+  static constexpr std::array<std::string_view, 8> values{"orbit", "pan", "zoom", "focus", "roll", "working_distance", "guide", "flight"};
+};
+
 /// What the motion of a device means to the camera (thesis 8.2.2): its translation moves the camera, or turns it, or all six degrees of the
 /// device count at once.
 enum class CameraGuide : int { shift, turn, six };
@@ -68,7 +76,10 @@ class ScopeControl {
   ScopeArm arm;
 
   // --- at once; input of one kind that goes on is one move
-  enum class Kind { orbit, pan, zoom, focus, roll, working_distance, guide };
+  using Kind = ScopeMove;
+  using Moves = std::array<unsigned, EnumNames<ScopeMove>::values.size()>;
+  /// How many of each there were.
+  [[nodiscard]] const Moves& moves() const { return moves_; }
   void orbit(double right_rad, double up_rad);
   void pan(double right_mm, double up_mm);
   void roll(double angle_rad);
@@ -123,6 +134,7 @@ class ScopeControl {
   std::deque<ScopeView> undo_;
   std::optional<Kind> kind_;
   double quiet_s_ = 0;
+  Moves moves_{};
 };
 
 }  // namespace osteo

@@ -32,6 +32,8 @@ class WorldView {
   /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn until camera or pieces
   /// move. Bone that changes meanwhile is drawn whole.
   void rest(int width, int height);
+  /// All is drawn again, for pictures from elsewhere than the camera rests.
+  void wake();
   [[nodiscard]] std::size_t drawn_triangles() const { return drawn_ > 0 ? drawn_ : triangles(); }
 
  private:
@@ -41,7 +43,6 @@ class WorldView {
     BoneView::Arrays arrays;
     std::vector<std::uint32_t> triangles;
   };
-  void wake();
   struct Plate {
     vtkSmartPointer<vtkActor> actor, moving;
   };

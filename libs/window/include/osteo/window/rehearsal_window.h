@@ -24,6 +24,7 @@ struct WindowOptions {
   std::string approval;          ///< of the case, in words; empty: unknown
   bool approval_ended = false;   ///< by a later change: said in another colour
   StereoParams stereo;
+  bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
