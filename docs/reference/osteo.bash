@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound experiment devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -35,6 +35,7 @@ _osteo() {
     "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
     "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
+    "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
@@ -82,10 +83,11 @@ _osteo() {
     take-back) flags="$flags --source --by-place --check" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --stereo --stereo-base --experiment --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;
+    experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s" ;;
     devices) flags="$flags --watch --recording" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;

@@ -34,6 +34,7 @@ int ExperimentCommand::run(const Params& p, cli::Invocation& io) {
   const auto targets = camera_targets(start, static_cast<std::size_t>(p.targets), seed);
   SimulatedPerson person;
   person.noise = p.noise;
+  person.crosstalk = p.crosstalk;
   person.reaction_s = p.reaction_s;
   Json modes = Json::list();
   std::string csv;
@@ -66,8 +67,8 @@ int ExperimentCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   if (!p.out.empty()) write_file(p.out, csv);
   if (io.common.json)
-    io.out << Json{{"simulated", true}, {"targets", p.targets},       {"seed", io.common.seed},
-                   {"noise", p.noise},  {"reaction_s", p.reaction_s}, {"modes", modes}}
+    io.out << Json{{"simulated", true},        {"targets", p.targets},       {"seed", io.common.seed}, {"noise", p.noise},
+                   {"crosstalk", p.crosstalk}, {"reaction_s", p.reaction_s}, {"modes", modes}}
                   .dump(2)
            << '\n';
   return 0;

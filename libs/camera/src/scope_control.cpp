@@ -38,13 +38,13 @@ Vec3 running_out(Vec3& v, double a, double tau, double t) {
 }  // namespace
 
 ScopeMotion ScopeArm::advance(const std::optional<ScopeRates>& drive, double seconds) {
-  const double tau = params_.inertia_s;
+  const double tau = params.inertia_s;
   if (!drive) {
-    return {running_out(velocity_.move_mm_s, params_.friction_mm_s2, tau, seconds),
-            running_out(velocity_.turn_rad_s, params_.friction_rad_s2, tau, seconds)};
+    return {running_out(velocity_.move_mm_s, params.friction_mm_s2, tau, seconds),
+            running_out(velocity_.turn_rad_s, params.friction_rad_s2, tau, seconds)};
   }
-  return {driven(velocity_.move_mm_s, limited(drive->move_mm_s, params_.most_mm_s), tau, seconds),
-          driven(velocity_.turn_rad_s, limited(drive->turn_rad_s, params_.most_rad_s), tau, seconds)};
+  return {driven(velocity_.move_mm_s, limited(drive->move_mm_s, params.most_mm_s), tau, seconds),
+          driven(velocity_.turn_rad_s, limited(drive->turn_rad_s, params.most_rad_s), tau, seconds)};
 }
 
 void ScopeControl::keep() {
@@ -117,8 +117,8 @@ void ScopeControl::guide(CameraGuide mode, const ScopeMotion& device, double sec
     wanted.turn_rad = {-device.shift_mm.y * kRadPerMm, device.shift_mm.x * kRadPerMm, 0};
     wanted.shift_mm = {0, 0, device.shift_mm.z * mm};
   }
-  arm.params_.most_mm_s = 4 * view_.field_mm();
-  arm.params_.friction_mm_s2 = 0.5 * view_.field_mm();
+  arm.params.most_mm_s = 4 * view_.field_mm();
+  arm.params.friction_mm_s2 = 0.5 * view_.field_mm();
   const bool rests = length(wanted.shift_mm) == 0 && length(wanted.turn_rad) == 0;
   const auto drive = rests ? std::nullopt : std::optional(ScopeRates{wanted.shift_mm / seconds, wanted.turn_rad / seconds});
   move(view_, arm.advance(drive, seconds));
@@ -128,8 +128,8 @@ void ScopeControl::drive(Vec3 shift, Vec3 turn, double seconds) {
   const bool rests = length(shift) == 0 && length(turn) == 0;
   if (rests && !arm.moves()) return;
   begin(Kind::guide);
-  arm.params_.most_mm_s = 4 * view_.field_mm();
-  arm.params_.friction_mm_s2 = 0.5 * view_.field_mm();
+  arm.params.most_mm_s = 4 * view_.field_mm();
+  arm.params.friction_mm_s2 = 0.5 * view_.field_mm();
   const auto drive = rests ? std::nullopt : std::optional(ScopeRates{shift * view_.field_mm(), turn * 0.5});
   move(view_, arm.advance(drive, seconds));
 }

@@ -396,7 +396,7 @@ class RehearsalWindow {
     scope_.advance(keyboard_, io.KeyShift, devices, seconds);
     control_.look_from(view_axes());
     if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv")) control_.say(*said);
-    control_.hold({seconds, ImGui::IsMouseDown(ImGuiMouseButton_Left), in_view && !io.WantCaptureMouse, read_gamepad()});
+    control_.hold({seconds, ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent(), in_view && !io.WantCaptureMouse, read_gamepad()});
   }
 
   // The mouse is the hand, or what the hand's tool is moved by.

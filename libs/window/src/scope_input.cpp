@@ -12,6 +12,7 @@ constexpr double kDeviceMmPerPx = 0.25;  // a screen of about 100 dots to the in
 constexpr double kZoomPerStep = 1.1;
 constexpr double kKeyRadPerS = 0.8;
 constexpr double kFocusPerKey = 0.02;  // of the field
+constexpr double kNakedEye = 2;        // magnifications below are called so
 
 Vec3 side(StandardView from) {
   switch (from) {
@@ -81,7 +82,15 @@ bool ScopeInput::key(const Keyboard::Press& press, bool shift, const ScopeScene&
   };
   switch (press.command) {
     case Command::magnify:
-      control.step(press.value);
+      // From the naked eye to the microscope: it comes down on the bone in the middle.
+      if (press.value > 0 && view().magnification < kNakedEye) {
+        ScopeView to = control.target();
+        step_magnification(to, press.value);
+        if (const auto at = bone(view().back * -1)) focus_on_depth_of(to, *at);
+        control.go(to);
+      } else {
+        control.step(press.value);
+      }
       return true;
     case Command::focus:
       control.focus(press.value * kFocusPerKey * view().field_mm());
@@ -167,7 +176,8 @@ void ScopeInput::advance(const Keyboard& keyboard, bool shift, const CameraDevic
 
 std::string scope_words(const ScopeView& view) {
   char text[96];
-  std::snprintf(text, sizeof text, view.magnification < 2 ? "eye %.1fx  field %.0f mm  at %.0f mm" : "%.1fx  field %.1f mm  WD %.0f mm",
+  std::snprintf(text, sizeof text,
+                view.magnification < kNakedEye ? "eye %.1fx  field %.0f mm  at %.0f mm" : "%.1fx  field %.1f mm  WD %.0f mm",
                 view.magnification, view.field_mm(), view.working_distance_mm);
   return text;
 }

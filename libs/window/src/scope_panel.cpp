@@ -2,6 +2,7 @@
 
 #include <imgui.h>
 
+#include <algorithm>
 #include <string>
 
 #include "osteo/base/param.h"
@@ -16,12 +17,12 @@ void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stere
   const auto draw = [&](double right, double up, double squeezed) {
     const float x = static_cast<float>(area.x + right * area.width) + line, y = static_cast<float>(area.y + area.height * (1 - up)) - line;
     const float wide = static_cast<float>(bar.length_px * squeezed);
-    constexpr ImU32 kInk = IM_COL32(235, 235, 235, 255), kShade = IM_COL32(0, 0, 0, 200);
-    for (const auto& [ink, off] : {std::pair{kShade, 1.0F}, std::pair{kInk, 0.0F}}) {
-      list->AddRectFilled({x + off, y - 3 + off}, {x + wide + off, y + off}, ink);
-      list->AddText({x + off, y - 4 - line + off}, ink, length.c_str());
-      list->AddText({x + off, y - 6 - 2 * line + off}, ink, words.c_str());
-    }
+    constexpr ImU32 kInk = IM_COL32(235, 235, 235, 255);
+    const float most = std::max(wide, ImGui::CalcTextSize(words.c_str()).x);
+    list->AddRectFilled({x - 8, y - 14 - 2 * line}, {x + most + 8, y + 8}, IM_COL32(10, 14, 20, 150), 4);  // legible on white bone too
+    list->AddRectFilled({x, y - 3}, {x + wide, y}, kInk);
+    list->AddText({x, y - 5 - line}, kInk, length.c_str());
+    list->AddText({x, y - 7 - 2 * line}, kInk, words.c_str());
   };
   draw(0, 0, stereo == StereoMode::side_by_side ? 0.5 : 1);
   if (stereo == StereoMode::side_by_side) draw(0.5, 0, 0.5);
@@ -76,8 +77,8 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   bool upright = control.target().upright;
   if (ImGui::Checkbox("head stays up", &upright)) control.set_upright(upright);
   ImGui::Checkbox("fly to views (0.4 s)", &control.flights);
-  auto inertia = static_cast<float>(control.arm.params_.inertia_s);
-  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f")) control.arm.params_.inertia_s = static_cast<double>(inertia);
+  auto inertia = static_cast<float>(control.arm.params.inertia_s);
+  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f")) control.arm.params.inertia_s = static_cast<double>(inertia);
   ImGui::Text("O, pedal: the device");
   int mode = static_cast<int>(scope.mode);
   bool changed = ImGui::RadioButton("moves", &mode, 0);

@@ -42,7 +42,7 @@ TEST(ScopeArm, RunsOutAsItsEquationSays) {
   constexpr double kStep = 1e-6;
   for (double t = 0; t < 0.1; t += kStep) {
     x += v * kStep;
-    v = std::max(0.0, v - kStep * (v / arm.params_.inertia_s + arm.params_.friction_mm_s2));
+    v = std::max(0.0, v - kStep * (v / arm.params.inertia_s + arm.params.friction_mm_s2));
   }
   const ScopeMotion m = arm.advance(std::nullopt, 0.1);
   EXPECT_NEAR(m.shift_mm.x, x, 1e-3);
@@ -55,8 +55,8 @@ TEST(ScopeArm, RunsOutAsItsEquationSays) {
 TEST(ScopeArm, RapidMovesAreLimited) {
   ScopeArm arm;
   static_cast<void>(arm.advance(ScopeRates{{1e6, 0, 0}, {0, 1e6, 0}}, 10));
-  EXPECT_NEAR(length(arm.velocity().move_mm_s), arm.params_.most_mm_s, 1e-9);
-  EXPECT_NEAR(length(arm.velocity().turn_rad_s), arm.params_.most_rad_s, 1e-9);
+  EXPECT_NEAR(length(arm.velocity().move_mm_s), arm.params.most_mm_s, 1e-9);
+  EXPECT_NEAR(length(arm.velocity().turn_rad_s), arm.params.most_rad_s, 1e-9);
 }
 
 TEST(ScopeControl, FliesInFourTenthsOfASecondOrAtOnce) {
@@ -162,7 +162,7 @@ TEST(ScopeControl, LooksAtAndAlongTheDrill) {
 // The modes of the thesis: the device's translation moves the camera or turns it; how far goes with the field.
 TEST(ScopeControl, ADeviceMovesOrTurnsTheCamera) {
   ScopeControl c;
-  c.arm.params_.inertia_s = 0;
+  c.arm.params.inertia_s = 0;
   ScopeView v = c.view();
   v.upright = false;
   c.jump(v);
@@ -196,7 +196,7 @@ TEST(ScopeControl, InertiaGoesOnWhileTheBrakeIsReleasedAndNotAfter) {
 
 TEST(ScopeControl, RatesAreFieldsASecond) {
   ScopeControl c;
-  c.arm.params_.inertia_s = 0;
+  c.arm.params.inertia_s = 0;
   const ScopeView v = c.view();
   for (int n = 0; n < 60; ++n) c.drive({1, 0, 0}, {}, 1.0 / 60);
   EXPECT_NEAR(length(c.view().focus_mm - v.focus_mm), v.field_mm(), 1e-9);

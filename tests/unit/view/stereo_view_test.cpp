@@ -3,11 +3,14 @@
 #include <vtkActor.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkNew.h>
+#include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
@@ -65,6 +68,7 @@ ScopeView some_view(double magnification) {
 
 TEST(ScopeCamera, APlaceIsDrawnAtItsPixel) {
   Marker marker;
+  double worst = 0;
   for (const double m : {4.0, 10.0}) {
     const ScopeView v = some_view(m);
     aim(marker.renderer_, v, kArea);
@@ -74,13 +78,15 @@ TEST(ScopeCamera, APlaceIsDrawnAtItsPixel) {
       const auto seen = marker.seen(), wanted = *v.pixel(at, kArea);
       EXPECT_NEAR(seen[0], wanted[0], 0.3);
       EXPECT_NEAR(seen[1], wanted[1], 0.3);
+      worst = std::max({worst, std::abs(seen[0] - wanted[0]), std::abs(seen[1] - wanted[1])});
     }
   }
+  RecordProperty("worst_px", std::to_string(worst));
 }
 
 TEST(ScopeCamera, DisparityIsAsTheFormulaSaysAndNoughtAtTheFocus) {
   Marker marker;
-  double worst = 0;
+  double worst = 0, rows = 0;
   for (const double m : {4.0, 10.0}) {
     const ScopeView v = some_view(m);
     for (const StereoParams& s : {StereoParams{StereoMode::anaglyph, 24}, StereoParams{StereoMode::anaglyph, 22, 3}}) {
@@ -97,11 +103,13 @@ TEST(ScopeCamera, DisparityIsAsTheFormulaSaysAndNoughtAtTheFocus) {
         if (nearer == s.convergence_mm) {
           EXPECT_NEAR(left[0] - right[0], 0, 0.5);
         }
+        rows = std::max(rows, std::abs(left[1] - right[1]));
         EXPECT_NEAR(left[1], right[1], 0.2) << "toe-in would show here";
       }
     }
   }
   RecordProperty("worst_px", std::to_string(worst));
+  RecordProperty("worst_rows_px", std::to_string(rows));
   // Back to one eye: nothing of the frusta's offset is left.
   const ScopeView v = some_view(4);
   aim(marker.renderer_, v, kArea);

@@ -30,15 +30,16 @@ class ScopeArm {
     double most_mm_s = 400;        ///< limit of the drive
     double most_rad_s = 2;
   };
+  Params params;
+
   ScopeArm() = default;
-  explicit ScopeArm(const Params& params) : params_(params) {}
+  explicit ScopeArm(const Params& p) : params(p) {}
   /// The way of the next `seconds`; no drive: it is let go, the brake still released.
   ScopeMotion advance(const std::optional<ScopeRates>& drive, double seconds);
   /// The brake: at rest at once.
   void brake() { velocity_ = {}; }
   [[nodiscard]] const ScopeRates& velocity() const { return velocity_; }
   [[nodiscard]] bool moves() const { return !(velocity_.move_mm_s == Vec3{} && velocity_.turn_rad_s == Vec3{}); }
-  Params params_;
 
  private:
   ScopeRates velocity_;
