@@ -137,14 +137,14 @@ const std::vector<HelpLine>& help_lines() {
   return lines;
 }
 
-void Keyboard::on(int code, Event event) {
+void Keyboard::on(int code, Event event, bool shift) {
   const Key* const key = find_key(code);
   if (key == nullptr) return;
   if (event == Event::released) {
     std::erase(down_, key->command);
     return;
   }
-  if (event == Event::pressed || key->when == Key::When::repeated) presses_.push_back({key->command, key->value});
+  if (event == Event::pressed || key->when == Key::When::repeated) presses_.push_back({key->command, key->value, shift});
   if (!has(down_, key->command)) down_.push_back(key->command);
   if (!has(since_, key->command)) since_.push_back(key->command);
 }

@@ -73,10 +73,11 @@ struct HelpLine {
 class Keyboard {
  public:
   enum class Event { released = 0, pressed = 1, repeated = 2 };  // as GLFW numbers them
-  void on(int code, Event event);
+  void on(int code, Event event, bool shift = false);
   struct Press {
     Command command;
     int value;
+    bool shift = false;  ///< was down with it; at few pictures a second it is up again when the press is heard of
   };
   /// What was pressed since the last frame, in order; with `ignore` (someone writes text) nothing, and nothing is held.
   [[nodiscard]] std::vector<Press> frame(bool ignore);

@@ -117,8 +117,9 @@ class RehearsalWindow {
 
     // ImGui chains this callback behind its own.
     glfwSetWindowUserPointer(window_, this);
-    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
-      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))->keyboard_.on(key, static_cast<Keyboard::Event>(action));
+    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) {
+      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))
+          ->keyboard_.on(key, static_cast<Keyboard::Event>(action), (mods & GLFW_MOD_SHIFT) != 0);
     });
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;
@@ -386,7 +387,7 @@ class RehearsalWindow {
     const std::optional<Vec3> direction = in_view ? std::optional(ray(x, y)) : std::nullopt;
     for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
       std::string said;
-      if (scope_.key(press, io.KeyShift, scope_scene(), direction, said)) {
+      if (scope_.key(press, scope_scene(), direction, said)) {
         if (!said.empty()) control_.say(said);
       } else if (!control_.command(press, direction)) {
         command(press.command);

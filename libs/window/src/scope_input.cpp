@@ -72,8 +72,7 @@ bool ScopeInput::mouse(const ScopeMouse& m, bool as_device, double seconds) {
   return false;
 }
 
-bool ScopeInput::key(const Keyboard::Press& press, bool shift, const ScopeScene& scene, const std::optional<Vec3>& under_mouse,
-                     std::string& said) {
+bool ScopeInput::key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse, std::string& said) {
   const auto bone = [&](Vec3 direction) { return scene.bone ? scene.bone(view().eye_mm(), direction) : std::nullopt; };
   const auto tell = [&](const char* format, auto... values) {
     char text[96];
@@ -112,14 +111,14 @@ bool ScopeInput::key(const Keyboard::Press& press, bool shift, const ScopeScene&
       }
       return true;
     case Command::look_at_drill:
-      if (shift) {
+      if (press.shift) {
         control.look_along(scene.drill_mm, scene.handle);
       } else {
         control.look_at(scene.drill_mm);
       }
       return true;
     case Command::bookmark:
-      if (shift) {
+      if (press.shift) {
         control.set_bookmark(static_cast<std::size_t>(press.value));
         tell("view %d kept", press.value + 1);
       } else if (!control.go_to_bookmark(static_cast<std::size_t>(press.value))) {

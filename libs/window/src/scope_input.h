@@ -43,7 +43,7 @@ class ScopeInput {
   /// hand.
   bool mouse(const ScopeMouse& mouse, bool as_device, double seconds);
   /// True when the key was the camera's; `said` is what there is to say of it. `under_mouse`: ray through the mouse.
-  bool key(const Keyboard::Press& press, bool shift, const ScopeScene& scene, const std::optional<Vec3>& under_mouse, std::string& said);
+  bool key(const Keyboard::Press& press, const ScopeScene& scene, const std::optional<Vec3>& under_mouse, std::string& said);
   /// Keys that are held, devices, flights: once a frame, after the mouse.
   void advance(const Keyboard& keyboard, bool shift, const CameraDevices& devices, double seconds);
   /// The whole bone, as when a session begins; `fly`: or at once.

@@ -30,7 +30,7 @@ ScopeInput some_input() {
 
 std::string press(ScopeInput& input, Command command, int value = 0, bool shift = false, std::optional<Vec3> under = {}) {
   std::string said;
-  EXPECT_TRUE(input.key({command, value}, shift, some_scene(), under, said));
+  EXPECT_TRUE(input.key({command, value, shift}, some_scene(), under, said));
   input.advance(Keyboard(), false, {}, 1);
   return said;
 }
@@ -110,7 +110,7 @@ TEST(ScopeInput, KeysForViews) {
   for (int n = 0; n < 10; ++n) press(input, Command::camera_back);
   EXPECT_NE(press(input, Command::camera_back), "");
   std::string said;
-  EXPECT_FALSE(input.key({Command::bring, 0}, false, some_scene(), {}, said)) << "not the camera's";
+  EXPECT_FALSE(input.key({Command::bring, 0}, some_scene(), {}, said)) << "not the camera's";
 }
 
 TEST(ScopeInput, StandardViews) {
