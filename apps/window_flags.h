@@ -3,6 +3,7 @@
 #include <string>
 
 #include "osteo/bone/burr.h"
+#include "osteo/camera/stereo.h"
 #include "osteo/haptics/contact.h"
 #include "osteo/view/quality.h"
 
@@ -40,6 +41,9 @@ struct WindowFlags {
   bool sound = true;
   double volume = 0.7;
   bool alarms = false;
+  StereoMode stereo = StereoMode::off;
+  double stereo_base = 22;
+  std::string experiment;
   bool require_approved = false;
   Quality quality = Quality::automatic;
   int width = 1360;
@@ -70,6 +74,10 @@ struct WindowFlags {
           p.sound);
     visit({"volume", "of that sound; long loud parts are held below the level that is safe with head-phones", "", 0, 1}, p.volume);
     visit({"alarms", "with it, beeps where a structure at risk is touched, two tones where it is injured"}, p.alarms);
+    visit({"stereo", "in the window, a picture for each eye, put together for the screen; docs/camera.md"}, p.stereo);
+    visit({"stereo_base", "between the eyes; they agree on what lies in the focus", "mm", 0, 65}, p.stereo_base);
+    visit({"experiment", "in the window, 'camera': views to bring the camera to, timed, as CSV in the session's folder (empty: none)"},
+          p.experiment);
     visit({"require_approved", "refuse a case that nobody has approved as it is ('osteo approve')"}, p.require_approved);
     visit({"quality",
            "how the picture is drawn: plain; calm, with shade in the creases and smooth edges when it rests; deep, always so; auto by "

@@ -23,12 +23,19 @@
 namespace osteo {
 namespace {
 
+bool is_space_mouse(const HidInfo& info) {
+  const DeviceModel m = model_of(info.vendor, info.product);
+  return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
+}
+
 // What moves the hands: as asked, or for the drill the best that is plugged in; with a pedal where there is one.
 class Hands {
  public:
   explicit Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) {
+    bool puck = false;
     for (const FoundDevice& f : find_devices()) {
       const bool mouse = f.model == DeviceModel::space_mouse || f.model == DeviceModel::space_mouse_wireless;
+      puck = puck || (mouse && f.readable);
       if (hand_ == Hand::automatic && f.readable && (mouse || f.model == DeviceModel::woodenhaptics))
         found_ = std::max(found_, mouse ? 1 : 2);
       if (f.readable && (f.model == DeviceModel::pedal_infinity || f.model == DeviceModel::pedal_pcsensor))
@@ -41,6 +48,29 @@ class Hands {
                                                                  : Hand::mouse;
     second_tool_ = static_cast<std::uint8_t>(instrument_index(flags.second_instrument));
     if (!flags.arm.empty()) geometry_ = load_woodenhaptics(flags.arm);
+    // One that moves no hand moves the camera.
+    if (puck && hand_ != Hand::spacemouse && second_ != Hand::spacemouse) puck_ = std::make_unique<CameraPuck>(open_first(is_space_mouse));
+  }
+  /// What there is for the camera. `first`: the drill's device, where one runs.
+  [[nodiscard]] CameraDevices camera(Device* first, bool lend) const {
+    CameraDevices devices;
+    // The right switch, where it is no second hand's.
+    devices.pedal = pedal_ && second_ == Hand::mouse && (pedal_->pressed() & pedal_bit(1)) != 0;
+    DeviceMotion motion = puck_ ? puck_->motion() : DeviceMotion{};
+    if (auto* const hand = dynamic_cast<LendsHand*>(first)) {
+      hand->lend(lend);
+      if (lend && !puck_) motion = hand->motion();
+      if (lend && puck_) {
+        const DeviceMotion own = hand->motion();
+        motion.hand_mm = own.hand_mm;
+        motion.axis = own.axis;
+      }
+    }
+    devices.hand_mm = motion.hand_mm;
+    devices.hand_axis = motion.axis;
+    devices.push = motion.push;
+    devices.turn = motion.turn;
+    return devices;
   }
   /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small. The second
   /// hand waits beside the first; moved by keys it is there for dust alone.
@@ -58,7 +88,7 @@ class Hands {
   [[nodiscard]] std::string name() const {
     return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) +
            (second_ != Hand::mouse ? ", " + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(second_)]) : "") +
-           (pedal_ && (hand_ != Hand::mouse || second_ != Hand::mouse) ? " and pedal" : "");
+           (pedal_ && (hand_ != Hand::mouse || second_ != Hand::mouse) ? " and pedal" : "") + (puck_ ? "; camera: spacemouse" : "");
   }
 
  private:
@@ -67,12 +97,8 @@ class Hands {
     const int before = number > 0 && hand_ == kind ? 1 : 0;
     // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
     if (kind == Hand::spacemouse) {
-      const auto wanted = [](const HidInfo& i) {
-        const DeviceModel m = model_of(i.vendor, i.product);
-        return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
-      };
-      return std::make_unique<SpaceMouseDevice>(open_first(wanted, before), start, Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}},
-                                                pedal_.get(), number);
+      return std::make_unique<SpaceMouseDevice>(open_first(is_space_mouse, before), start,
+                                                Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get(), number);
     }
     if (kind == Hand::woodenhaptics) {
       const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
@@ -89,6 +115,7 @@ class Hands {
   std::uint8_t second_tool_ = 0;
   WoodenHapticsGeometry geometry_;
   std::unique_ptr<FootPedal> pedal_;
+  std::unique_ptr<CameraPuck> puck_;
 };
 
 // In front of the bone on the patient's left, or where there is none, where a hand waits.
@@ -188,6 +215,7 @@ class Sitting {
   [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] std::string device() const { return hands_.name(); }
+  [[nodiscard]] CameraDevices camera(bool lend) const { return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend); }
   /// Of any session so far, ticks were not recorded.
   [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
 
@@ -255,6 +283,11 @@ struct WindowCommand {
     window.state_file = p.state_file;
     if (const auto it = the_case.files.find("region"); it != the_case.files.end()) window.bone.push_back(load_grid(it->second));
     window.bone.push_back(the_case.bone);
+    window.stereo.mode = p.stereo;
+    window.stereo.base_mm = p.stereo_base;
+    if (!p.experiment.empty() && p.experiment != "camera")
+      throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
+    window.camera_trial = p.experiment == "camera";
     window.approval = approval.words();
     window.approval_ended = approval.state == ApprovalState::outdated;
     if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));
@@ -268,6 +301,7 @@ struct WindowCommand {
     actions.rehearsal = [&] { return sitting.rehearsal(); };
     actions.folder = [&] { return sitting.folder(); };
     actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
+    actions.camera = [&](bool lend) { return sitting.camera(lend); };
     actions.stop = [&] { return io.context.cancelled(); };
     g_sitting = &sitting;
     int gl_errors = 0;

@@ -354,6 +354,25 @@ struct PlanCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
+struct ExperimentCommand {
+  struct Params {
+    std::string out;
+    int targets = 200;
+    double noise = 0.1;
+    double crosstalk = 0.15;
+    double reaction_s = 0.25;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "every view and its time, as CSV (empty: only the table; also -o)"}, p.out);
+    visit({"targets", "views to bring the camera to", "", 1, 10000}, p.targets);
+    visit({"noise", "standard deviation of a move's end, of its length", "", 0, 0.5}, p.noise);
+    visit({"crosstalk", "six degrees and rates: what an axis that was not meant gets of the others", "", 0, 1}, p.crosstalk);
+    visit({"reaction_s", "a look before each move", "s", 0, 2}, p.reaction_s);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
 struct DemoCommand {
   struct Params {
     std::string out = "out/demo";

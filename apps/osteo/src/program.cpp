@@ -28,6 +28,7 @@ cli::Program make_osteo_program() {
   p.add<ExportCommand>();
   p.add<SoundCommand>();
   p.add<HeatCommand>();
+  p.add<ExperimentCommand>();
   p.add<DevicesCommand>();
   p.add<DoctorCommand>();
   p.add<DemoCommand>();

@@ -85,7 +85,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
   } else {
     for (const char* const name : {"device", "arm", "second_device", "second_instrument"})
       refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
-    for (const char* const name : {"quality", "width", "height", "state_file", "scan", "sound", "volume", "alarms"})
+    for (const char* const name :
+         {"quality", "width", "height", "state_file", "scan", "sound", "volume", "alarms", "stereo", "stereo_base", "experiment"})
       refuse(name, "with --headless", "there is no window; leave it out");
   }
 }

@@ -18,7 +18,25 @@ Vec3 turned(Vec3 v, Vec3 axis, double angle) {
   return v * std::cos(angle) + cross(axis, v) * std::sin(angle) + axis * (dot(axis, v) * (1 - std::cos(angle)));
 }
 
+// A small dead zone, and finer near the middle.
+double shaped(double v) noexcept {
+  const double a = std::max(0.0, std::abs(v) - 0.04) / 0.96;
+  return std::copysign(a * (0.3 + 0.7 * a), v);
+}
+
+// The desk's right, away and up as right, up and towards the user.
+DeviceMotion motion_of(const SpaceMouseState& s) noexcept {
+  DeviceMotion m;
+  m.push = Vec3{shaped(s.move[0]), shaped(s.move[2]), -shaped(s.move[1])};
+  m.turn = {shaped(s.turn[0]), shaped(s.turn[2]), -shaped(s.turn[1])};
+  return m;
+}
+
 }  // namespace
+
+DeviceMotion CameraPuck::motion() const noexcept {
+  return motion_of(shared_.load());
+}
 
 Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, double hold_ms, double fade_ms) noexcept {
   if (p.time_ns == 0) return {};
@@ -60,23 +78,23 @@ void SpaceMouseDevice::gone() {
 DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexcept {
   static_cast<void>(shared_.try_load(last_));
   constexpr double kFullMmPerS = 60, kFullRadPerS = 1.5;
-  const auto& s = last_.state;
-  // A small dead zone, and finer near the middle.
-  const auto shaped = [](double v) {
-    const double a = std::max(0.0, std::abs(v) - 0.04) / 0.96;
-    return std::copysign(a * (0.3 + 0.7 * a), v);
-  };
+  const bool lent = lent_;
+  const SpaceMouseState s = lent ? SpaceMouseState{} : last_.state;
   const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])}, turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
   goal_.position_mm += rotation_ * (move * (kFullMmPerS * dt_s));
   if (const double rate = length(turn); rate > 0)
     goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
   const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
-  goal_.pedal = (s.buttons & 1U) != 0 || (pressed & pedal_bit_) != 0 ? 255 : 0;
+  goal_.pedal = !lent && ((s.buttons & 1U) != 0 || (pressed & pedal_bit_) != 0) ? 255 : 0;
   DeviceSample sample = hand_.step(goal_, dt_s, force_n);
   sample.buttons = static_cast<std::uint8_t>(s.buttons);
   // The cap at rest sends nothing, so silence is not a sign of an unplugged device; gone() says that.
   return sample;
+}
+
+DeviceMotion SpaceMouseDevice::motion() const noexcept {
+  return motion_of(shared_.load().state);
 }
 
 WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
@@ -142,23 +160,37 @@ DeviceSample WoodenHapticsDevice::read(std::uint64_t, double, Vec3) noexcept {
     silent_ = true;
     s.position_mm = to_floats(map_.last_mm());
   } else {
-    s.position_mm = to_floats(map_.update(last_pose_.position_mm, (pressed & 2U) != 0 || silent_));
+    s.position_mm = to_floats(map_.update(last_pose_.position_mm, (pressed & 2U) != 0 || silent_ || lent_));
     silent_ = false;
   }
   s.axis = to_floats(normalized(map_.direction(last_pose_.axis)));
-  s.pedal = last_pose_.button || (pressed & pedal_bit_) != 0 ? 255 : 0;
+  s.pedal = !lent_ && (last_pose_.button || (pressed & pedal_bit_) != 0) ? 255 : 0;
   s.tool = tool_;
   return s;
 }
 
 void WoodenHapticsDevice::feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept {
   ForcePlane p;
+  if (lent_) {  // what it is pushed by is not where its hand is
+    force_.store(p);
+    return;
+  }
   p.force_n = map_.to_device(force_n);
   p.normal = map_.to_device(normal);
   p.position_mm = last_pose_.position_mm;
   p.stiffness_n_per_mm = stiffness_n_per_mm * map_.scale();
   p.time_ns = monotonic_ns();
   force_.store(p);
+}
+
+DeviceMotion WoodenHapticsDevice::motion() const noexcept {
+  const Pose pose = pose_.load();
+  if (pose.time_ns == 0) return {};
+  const auto seen = [](Vec3 v) { return Vec3{-v.y, v.z, -v.x}; };  // of forward, left, up
+  DeviceMotion m;
+  m.hand_mm = seen(pose.position_mm);
+  m.axis = normalized(seen(pose.axis));
+  return m;
 }
 
 std::vector<FoundDevice> find_devices() {

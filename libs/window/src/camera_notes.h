@@ -11,6 +11,7 @@ struct CameraView {
   Vec3 eye_mm, target_mm, up;
   double view_angle_deg = 30;  ///< from the picture's lower edge to its upper
   double pixels_per_mm = 0;    ///< at the target: magnification on this screen
+  double magnification = 1;    ///< as an operating microscope's: field of view of 200 mm / magnification
   friend bool operator==(const CameraView&, const CameraView&) = default;
 };
 

@@ -11,11 +11,21 @@ enum : int {
   kSpace = 32,
   kEscape = 256,
   kEnter = 257,
+  kBackspace = 259,
   kDown = 264,
   kUp = 265,
   kHome = 268,
   kF1 = 290,
+  kF3 = 292,
+  kF4 = 293,
   kF5 = 294,
+  kF6 = 295,
+  kF7 = 296,
+  kF8 = 297,
+  kKeypad2 = 322,
+  kKeypad4 = 324,
+  kKeypad6 = 326,
+  kKeypad8 = 328,
   kKeypadEnter = 335,
 };
 
@@ -58,8 +68,24 @@ constexpr Key kKeys[] = {
     {'H', Command::help},
     {'Q', Command::quit},
     {'J', Command::quality},
-    {'W', Command::cut_in_middle},
-    {'G', Command::cuts_along_tool},
+    {kF3, Command::cut_in_middle},
+    {kF4, Command::cuts_along_tool},
+    {'[', Command::magnify, Key::When::pressed, -1},
+    {']', Command::magnify, Key::When::pressed, 1},
+    {',', Command::focus, Key::When::repeated, -1},
+    {'.', Command::focus, Key::When::repeated, 1},
+    {'/', Command::autofocus},
+    {'W', Command::look_there},
+    {'G', Command::look_at_drill},
+    {'O', Command::guide_camera, Key::When::held},
+    {kF6, Command::bookmark, Key::When::pressed, 0},
+    {kF7, Command::bookmark, Key::When::pressed, 1},
+    {kF8, Command::bookmark, Key::When::pressed, 2},
+    {kBackspace, Command::camera_back},
+    {kKeypad4, Command::orbit_left, Key::When::held},
+    {kKeypad6, Command::orbit_right, Key::When::held},
+    {kKeypad8, Command::orbit_up, Key::When::held},
+    {kKeypad2, Command::orbit_down, Key::When::held},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -84,9 +110,9 @@ const std::vector<HelpLine>& help_lines() {
                                               {"U", "lifts the drill out of the bone, drill off", {lift}},
                                               {"wheel, Up, Down, Shift-drag", "moves it deeper or back", {deeper, back}},
                                               {"left button, Space", "drills while held; Space: on and off", {drill}},
-                                              {"right drag", "turns the view", {}},
+                                              {"right drag", "turns the view about its focus; with Shift rolls it", {}},
                                               {"middle drag", "shifts the view", {}},
-                                              {"Ctrl-wheel", "nearer and farther", {}},
+                                              {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
                                               {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
                                               {"V, I", "a sucker, or water, beside the burr", {suck, wash}},
@@ -106,24 +132,32 @@ const std::vector<HelpLine>& help_lines() {
                                               {"F1, H", "shows this, and hides it", {help}},
                                               {"Q", "save and close", {quit}},
                                               {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
-                                              {"W", "a cut takes the middle, and back", {cut_in_middle}},
-                                              {"G", "cuts along the tool, or along the body", {cuts_along_tool}},
+                                              {"F3", "a cut takes the middle, and back", {cut_in_middle}},
+                                              {"F4", "cuts along the tool, or along the body", {cuts_along_tool}},
                                               {"cuts: wheel, Ctrl-wheel", "scrolls; nearer and farther", {}},
                                               {"cuts: click, Shift-move", "looks there in all three", {}},
                                               {"cuts: left drag", "measures", {}},
                                               {"cuts: right drag, right click", "window and level; as they were", {}},
-                                              {"cuts: middle drag, double click", "moves it; takes the middle, and back", {}}};
+                                              {"cuts: middle drag, double click", "moves it; takes the middle, and back", {}},
+                                              {"[, ]", "magnification, by its steps", {magnify}},
+                                              {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
+                                              {"W", "looks at the bone under the mouse", {look_there}},
+                                              {"G", "looks at the drill; with Shift along it", {look_at_drill}},
+                                              {"O", "mouse or device move the camera; with Shift turn it", {guide_camera}},
+                                              {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
+                                              {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
+                                              {"Backspace", "takes back the camera's last move", {camera_back}}};
   return lines;
 }
 
-void Keyboard::on(int code, Event event) {
+void Keyboard::on(int code, Event event, bool shift) {
   const Key* const key = find_key(code);
   if (key == nullptr) return;
   if (event == Event::released) {
     std::erase(down_, key->command);
     return;
   }
-  if (event == Event::pressed || key->when == Key::When::repeated) presses_.push_back({key->command, key->value});
+  if (event == Event::pressed || key->when == Key::When::repeated) presses_.push_back({key->command, key->value, shift});
   if (!has(down_, key->command)) down_.push_back(key->command);
   if (!has(since_, key->command)) since_.push_back(key->command);
 }

@@ -40,6 +40,18 @@ enum class Command {
   cuts_along_tool,
   help,
   quit,
+  magnify,  // value: up or down
+  focus,    // value: deeper or back
+  autofocus,
+  look_there,
+  look_at_drill,
+  guide_camera,
+  bookmark,  // value: which
+  camera_back,
+  orbit_left,
+  orbit_right,
+  orbit_up,
+  orbit_down,
 };
 
 struct Key {
@@ -64,10 +76,11 @@ struct HelpLine {
 class Keyboard {
  public:
   enum class Event { released = 0, pressed = 1, repeated = 2 };  // as GLFW numbers them
-  void on(int code, Event event);
+  void on(int code, Event event, bool shift = false);
   struct Press {
     Command command;
     int value;
+    bool shift = false;  ///< was down with it; at few pictures a second it is up again when the press is heard of
   };
   /// What was pressed since the last frame, in order; with `ignore` (someone writes text) nothing, and nothing is held.
   [[nodiscard]] std::vector<Press> frame(bool ignore);

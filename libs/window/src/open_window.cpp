@@ -11,7 +11,7 @@
 
 namespace osteo {
 
-GLFWwindow* open_window(const std::string& title, int width, int height, const std::string& without_display) {
+GLFWwindow* open_window(const std::string& title, int width, int height, const std::string& without_display, bool two_buffers) {
   static std::string reason;
   glfwSetErrorCallback([](int, const char* text) { reason = text; });
   if (glfwInit() == GLFW_FALSE) throw Error(ExitCode::failed, "no window can be opened: " + reason, without_display);
@@ -22,7 +22,12 @@ GLFWwindow* open_window(const std::string& title, int width, int height, const s
   if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &x, &y, &screen_width, &screen_height);
   if (screen_width > 0) width = std::min(width, screen_width);
   if (screen_height > 0) height = std::min(height, screen_height);
-  GLFWwindow* const window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+  glfwWindowHint(GLFW_STEREO, two_buffers ? GLFW_TRUE : GLFW_FALSE);
+  GLFWwindow* window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+  if (window == nullptr && two_buffers) {
+    glfwWindowHint(GLFW_STEREO, GLFW_FALSE);
+    window = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+  }
   if (window == nullptr) {
     glfwTerminate();
     throw Error(ExitCode::failed, "no window can be opened: " + reason, "OpenGL 3.2 is needed");

@@ -9,7 +9,6 @@
 #include <imgui.h>
 
 #include <vtkActor.h>
-#include <vtkCamera.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
@@ -21,9 +20,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -37,21 +34,24 @@
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/scope_camera.h"
 #include "osteo/view/structures_view.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
 #include "scene_painter.h"
 #include "scene_tools.h"
+#include "scope_panel.h"
 #include "settings_panel.h"
 #include "sound_panel.h"
 #include "status_panel.h"
+#include "stereo_screen.h"
+#include "trial_overlay.h"
 #include "window_state.h"
 
 namespace osteo {
 namespace {
 
 constexpr int kPanelWidth = 270;
-constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 
 class RehearsalWindow {
  public:
@@ -65,21 +65,24 @@ class RehearsalWindow {
         state_file_(options.state_file),
         device_name_(options.device) {
     cuts_.set_case(options.ct, hu, options.bone);
+    stereo_.params = options.stereo;
     open(options);
     painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
     painter_->quality().want(options.quality);
     make_scene();
-    look_from(kFromLeft);
+    scope_.overview(StandardView::left, scope_scene(), false);
     show_words("loading the case");
     control_.look_from(view_axes());
     control_.begin(options.from_case, false);
-    look_from(kFromLeft);
+    scope_.overview(StandardView::left, scope_scene(), false);
+    if (options.camera_trial) trial_.begin(scope_.view(), middle_of_bone());
   }
 
   ~RehearsalWindow() {
     glfwMakeContextCurrent(window_);
     cuts_.release();
     structures_.reset();
+    stereo_.release();
     tools_.reset();
     world_view_.reset();
     render_window_->Finalize();
@@ -104,7 +107,8 @@ class RehearsalWindow {
   // --- set-up -----------------------------------------------------------------------------------------------------
 
   void open(const WindowOptions& options) {
-    window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless");
+    window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless",
+                          options.stereo.mode == StereoMode::quad_buffer);
 
     render_window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
     render_window_->SetOwnContext(0);
@@ -116,8 +120,9 @@ class RehearsalWindow {
 
     // ImGui chains this callback behind its own.
     glfwSetWindowUserPointer(window_, this);
-    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
-      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))->keyboard_.on(key, static_cast<Keyboard::Event>(action));
+    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) {
+      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))
+          ->keyboard_.on(key, static_cast<Keyboard::Event>(action), (mods & GLFW_MOD_SHIFT) != 0);
     });
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;
@@ -156,15 +161,7 @@ class RehearsalWindow {
     cuts_.begin(rehearsal, structures_.get());
   }
 
-  void look_from(Vec3 eye) { look_at(renderer_, control_.centre_mm(), 0.8 * control_.radius_mm(), normalized(eye)); }
-
   // --- the view ---------------------------------------------------------------------------------------------------
-
-  [[nodiscard]] Vec3 view_direction() const {
-    double d[3];
-    renderer_->GetActiveCamera()->GetDirectionOfProjection(d);
-    return {d[0], d[1], d[2]};
-  }
 
   // What a hand is drawn as.
   struct DrawnHand {
@@ -182,35 +179,44 @@ class RehearsalWindow {
   }
 
   // World point under a window position at the depth of `reference` along the view.
-  [[nodiscard]] Vec3 unproject(double x, double y, Vec3 reference) {
-    renderer_->SetWorldPoint(reference.x, reference.y, reference.z, 1);
-    renderer_->WorldToDisplay();
-    const double depth = renderer_->GetDisplayPoint()[2];
-    renderer_->SetDisplayPoint(x, height_ - 1 - y, depth);
-    renderer_->DisplayToWorld();
-    const double* const w = renderer_->GetWorldPoint();
-    return {w[0] / w[3], w[1] / w[3], w[2] / w[3]};
-  }
+  [[nodiscard]] Vec3 unproject(double x, double y, Vec3 reference) const { return scope_.view().at_depth_of(reference, scope_.area, x, y); }
 
-  [[nodiscard]] ViewAxes view_axes() {
-    double p[3], up[3];
-    renderer_->GetActiveCamera()->GetPosition(p);
-    renderer_->GetActiveCamera()->GetViewUp(up);
-    const Vec3 forward = view_direction(), right = normalized(cross(forward, {up[0], up[1], up[2]}));
-    return {{p[0], p[1], p[2]}, forward, right, cross(right, forward)};
+  [[nodiscard]] ViewAxes view_axes() const {
+    const ScopeView& view = scope_.view();
+    return {view.eye_mm(), view.back * -1, view.right(), view.up};
   }
 
   // From the eye through a place of the window.
-  [[nodiscard]] Vec3 ray(double x, double y) {
-    const Vec3 eye = view_axes().eye_mm;
-    return normalized(unproject(x, y, control_.centre_mm()) - eye);
+  [[nodiscard]] Vec3 ray(double x, double y) const { return scope_.view().ray(scope_.area, x, y); }
+
+  // What the camera may be asked to look at.
+  [[nodiscard]] ScopeScene scope_scene() {
+    ScopeScene scene{control_.centre_mm(), control_.radius_mm(), control_.goal_mm(), {0, 0, 1}, {}};
+    Rehearsal* const rehearsal = actions_.rehearsal();
+    if (rehearsal == nullptr || control_.failure()) return scene;
+    if (const TickRecord tick = rehearsal->latest(); tick.tick != 0) {
+      scene.drill_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm);
+      scene.handle = normalized(from_floats(tick.device.axis));
+    }
+    scene.bone = [rehearsal, reach = length(scene.centre_mm - scope_.view().eye_mm()) + 4 * scene.radius_mm](Vec3 from, Vec3 direction) {
+      std::optional<BoneHit> hit;
+      rehearsal->look([&](const World& world, SceneReaders&) { hit = bone_on_ray(world, from, direction, reach); });
+      return hit ? std::optional(hit->at_mm) : std::nullopt;
+    };
+    return scene;
+  }
+
+  // The bone in the middle of the picture; or the middle of all of it.
+  [[nodiscard]] Vec3 middle_of_bone() {
+    const ScopeScene scene = scope_scene();
+    return (scene.bone ? scene.bone(scope_.view().eye_mm(), scope_.view().back * -1) : std::nullopt).value_or(scene.centre_mm);
   }
 
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
     glfwPollEvents();
-    glfwGetFramebufferSize(window_, &width_, &height_);
+    measure_window();
     control_.watch();
     control_.look_from(view_axes());
     if (width_ < 200 || height_ < 150) {  // put away
@@ -219,7 +225,6 @@ class RehearsalWindow {
       return;
     }
     begin_picture();
-    cuts_.lay_out(width_, height_, kPanelWidth);
     if (control_.failure()) {
       tell_failure();
     } else {
@@ -229,6 +234,14 @@ class RehearsalWindow {
     end_picture();
     ++pictures_;
     write_state();
+  }
+
+  void measure_window() {
+    glfwGetFramebufferSize(window_, &width_, &height_);
+    cuts_.lay_out(width_, height_, kPanelWidth);
+    const CutsPanel::Box& scene = cuts_.scene();
+    scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y), std::max(1.0, static_cast<double>(scene.width)),
+                   std::max(1.0, static_cast<double>(scene.height))};
   }
 
   void begin_picture() {
@@ -263,33 +276,40 @@ class RehearsalWindow {
   }
 
   void note_camera(Rehearsal& rehearsal) {
-    vtkCamera* const camera = renderer_->GetActiveCamera();
-    const auto vec = [](const double* v) { return Vec3{v[0], v[1], v[2]}; };
-    CameraView view{vec(camera->GetPosition()), vec(camera->GetFocalPoint()), vec(camera->GetViewUp()), camera->GetViewAngle(), 0};
-    view.pixels_per_mm = height_ / (2 * camera->GetDistance() * std::tan(view.view_angle_deg * std::numbers::pi / 360));
+    const ScopeView& view = scope_.view();
+    const CameraView noted{view.eye_mm(),     view.focus_mm, view.up, view.view_angle_deg(scope_.area), view.pixels_per_mm(scope_.area),
+                           view.magnification};
     const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-    if (const auto note = camera_notes_.next(view, now_s, &rehearsal)) rehearsal.note("camera", *note);
+    if (const auto note = camera_notes_.next(noted, now_s, &rehearsal)) rehearsal.note("camera", *note);
   }
 
   void end_picture() {
-    ImGui::Render();
     render_window_->SetSize(width_, height_);
-    const CutsPanel::Box& scene = cuts_.scene();
-    // Mouse and scene agree in the window's own pixels.
-    const auto of = [](float a, int b) { return static_cast<double>(a) / b; };
-    renderer_->SetViewport(of(scene.x, width_), 1 - of(scene.y + scene.height, height_), of(scene.x + scene.width, width_),
-                           1 - of(scene.y, height_));
-    const auto whole = [](float x) { return static_cast<int>(std::lround(x)); };
-    const SceneBox box{whole(scene.x), height_ - whole(scene.y + scene.height), std::max(1, whole(scene.width)), std::max(1, whole(scene.height))};
+    const PictureArea& area = scope_.area;
+    renderer_->SetViewport(area.x / width_, 1 - (area.y + area.height) / height_, (area.x + area.width) / width_, 1 - area.y / height_);
+    aim(renderer_, scope_.view(), area);
     renderer_->ResetCameraClippingRange();
-    const bool settled = !world_view_ || control_.failure() || world_view_->rest(box.width, box.height, painter_->coarse());
-    const bool shows = painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData());
-    if (!shows) return painter_->wait();
+    const bool scene = world_view_ && !control_.failure(), two_eyes = scene && stereo_.on();
+    if (scene) draw_scope(scope_.view(), area, stereo_.params.mode);
+    if (scene) trial_.draw(scope_.view(), area);
+    if (two_eyes) {
+      world_view_->wake();  // what the middle of them cannot see, one of the eyes may
+      stereo_.draw(renderer_, render_window_, scope_.view(), area, height_);
+    }
+    ImGui::Render();
+    if (!two_eyes) {
+      const auto whole = [](double x) { return static_cast<int>(std::lround(x)); };
+      const SceneBox box{whole(area.x), height_ - whole(area.y + area.height), std::max(1, whole(area.width)),
+                         std::max(1, whole(area.height))};
+      const bool settled = !scene || world_view_->rest(box.width, box.height, painter_->coarse());
+      if (!painter_->begin({box, width_, height_, settled, input(), screenshot_wanted_}, ImGui::GetDrawData())) return painter_->wait();
+    }
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    glClearColor(0.05F, 0.06F, 0.08F, 1);
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    painter_->show();
-    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    stereo_.show([&] {
+      glClearColor(0.05F, 0.06F, 0.08F, 1);
+      glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+      if (!two_eyes) painter_->show();
+    });
     if (screenshot_wanted_) save_screenshot();
     for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
     glfwSwapBuffers(window_);
@@ -305,7 +325,7 @@ class RehearsalWindow {
   // While there is nothing else to see.
   void show_words(const char* words) {
     glfwPollEvents();
-    glfwGetFramebufferSize(window_, &width_, &height_);
+    measure_window();
     begin_picture();
     ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 100, static_cast<float>(height_) / 2 - 20});
     ImGui::Begin("words", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
@@ -357,75 +377,78 @@ class RehearsalWindow {
   }
 
   void mouse_and_keys() {
-    Rehearsal& rehearsal = control_.rehearsal();
-    HandTools& tools = control_.tools();
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
     const bool in_view = cuts_.scene().holds(m.x, m.y) && !show_help_;
-    vtkCamera* const camera = renderer_->GetActiveCamera();
+    const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(m.x), static_cast<double>(m.y));
+    const auto seconds = static_cast<double>(io.DeltaTime);
+    const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
+    scope_.lend(keyboard_.held(Command::guide_camera) || devices.pedal);
     if (in_view && !io.WantCaptureMouse) {
-      if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
-        camera->Azimuth(-0.35 * static_cast<double>(io.MouseDelta.x));
-        camera->Elevation(0.35 * static_cast<double>(io.MouseDelta.y));
-        camera->OrthogonalizeViewUp();
-      } else if (ImGui::IsMouseDragging(ImGuiMouseButton_Middle)) {
-        double f[3], p[3];
-        camera->GetFocalPoint(f);
-        camera->GetPosition(p);
-        const Vec3 focal{f[0], f[1], f[2]};
-        const Vec3 shift = unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), focal) -
-                           unproject(static_cast<double>(m.x), static_cast<double>(m.y), focal);
-        camera->SetFocalPoint(f[0] + shift.x, f[1] + shift.y, f[2] + shift.z);
-        camera->SetPosition(p[0] + shift.x, p[1] + shift.y, p[2] + shift.z);
-      } else if (!tools.in_hand()) {
-        use_tool(tools, rehearsal, m, io);
-      } else if (io.KeyShift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
-        control_.push_hand(0.05 * static_cast<double>(-io.MouseDelta.y));
-      } else if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) {
-        control_.move_hand(unproject(static_cast<double>(m.x), static_cast<double>(m.y), control_.goal_mm()));
-      }
-      if (io.MouseWheel != 0) {
-        if (io.KeyCtrl) {
-          camera->Dolly(std::pow(1.1, static_cast<double>(io.MouseWheel)));
-        } else if (!tools.in_hand()) {
-          tools.push(1.0 * static_cast<double>(io.MouseWheel), rehearsal, view_axes());
-        } else {
-          control_.push_hand(0.5 * static_cast<double>(io.MouseWheel));
-        }
-      }
+      const ScopeMouse mouse{x,
+                             y,
+                             static_cast<double>(io.MouseDelta.x),
+                             static_cast<double>(io.MouseDelta.y),
+                             static_cast<double>(io.MouseWheel),
+                             ImGui::IsMouseDragging(ImGuiMouseButton_Right),
+                             ImGui::IsMouseDragging(ImGuiMouseButton_Middle),
+                             io.KeyCtrl,
+                             io.KeyShift};
+      if (!scope_.mouse(mouse, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(mouse);
     }
     control_.look_from(view_axes());  // the mouse may have turned it
-    const std::optional<Vec3> direction = in_view ? std::optional(ray(static_cast<double>(m.x), static_cast<double>(m.y))) : std::nullopt;
+    const std::optional<Vec3> direction = in_view ? std::optional(ray(x, y)) : std::nullopt;
     for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
-      if (!control_.command(press, direction)) command(press.command);
+      std::string said;
+      if (scope_.key(press, scope_scene(), direction, said)) {
+        if (!said.empty()) control_.say(said);
+      } else if (!control_.command(press, direction)) {
+        command(press.command);
+      }
       if (control_.failure()) return;
     }
-    control_.hold(
-        {static_cast<double>(io.DeltaTime), ImGui::IsMouseDown(ImGuiMouseButton_Left), in_view && !io.WantCaptureMouse, read_gamepad()});
+    scope_.advance(keyboard_, io.KeyShift, devices, seconds);
+    control_.look_from(view_axes());
+    if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv")) control_.say(*said);
+    control_.hold({seconds, ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent(), in_view && !io.WantCaptureMouse, read_gamepad()});
+  }
+
+  // The mouse is the hand, or what the hand's tool is moved by.
+  void use_mouse(const ScopeMouse& m) {
+    Rehearsal& rehearsal = control_.rehearsal();
+    HandTools& tools = control_.tools();
+    if (!tools.in_hand()) {
+      use_tool(tools, rehearsal, m);
+      if (m.wheel != 0) tools.push(1.0 * m.wheel, rehearsal, view_axes());
+      return;
+    }
+    if (m.shift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+      control_.push_hand(0.05 * -m.dy);
+    } else if (m.dx != 0 || m.dy != 0) {
+      control_.move_hand(unproject(m.x, m.y, control_.goal_mm()));
+    }
+    if (m.wheel != 0) control_.push_hand(0.5 * m.wheel);
   }
 
   // Saw and pieces: what the mouse drags is not the hand.
-  void use_tool(HandTools& tools, Rehearsal& rehearsal, const ImVec2& m, const ImGuiIO& io) {
-    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
-      tools.pick(rehearsal, view_axes().eye_mm, ray(static_cast<double>(m.x), static_cast<double>(m.y)));
-    }
-    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (io.MouseDelta.x == 0 && io.MouseDelta.y == 0)) return;
+  void use_tool(HandTools& tools, Rehearsal& rehearsal, const ScopeMouse& m) {
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) tools.pick(rehearsal, view_axes().eye_mm, ray(m.x, m.y));
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (m.dx == 0 && m.dy == 0)) return;
     const Vec3 at = tools.position_mm();
-    const Vec3 by = unproject(static_cast<double>(m.x), static_cast<double>(m.y), at) -
-                    unproject(static_cast<double>(m.x - io.MouseDelta.x), static_cast<double>(m.y - io.MouseDelta.y), at);
+    const Vec3 by = unproject(m.x, m.y, at) - unproject(m.x - m.dx, m.y - m.dy, at);
     const ViewAxes view = view_axes();
-    tools.drag(dot(by, view.right), dot(by, view.up), io.KeyShift, rehearsal, view);
+    tools.drag(dot(by, view.right), dot(by, view.up), m.shift, rehearsal, view);
   }
 
   // What is the window's own.
   void command(Command command) {
     if (command == Command::screenshot) screenshot_wanted_ = true;
-    if (command == Command::home) look_from(kFromLeft);
     if (command == Command::help) show_help_ = !show_help_;
     if (command == Command::sound) sound_.turn(!sound_.on());
     if (command == Command::quality) {
       QualityChoice& q = painter_->quality();
       q.want(static_cast<Quality>((static_cast<int>(q.wish()) + 1) % 4));
+    }
     if (command == Command::cut_in_middle) cuts_.control().enlarge_or_back();
     if (command == Command::cuts_along_tool) {
       const bool along = cuts_.control().planes() == CutsControl::Planes::tool;
@@ -490,14 +513,7 @@ class RehearsalWindow {
     ImGui::Dummy({0, 6});
     const bool resets = ImGui::Button("Reset the bone (R)", {-1, 0});
     ImGui::Separator();
-    ImGui::Text("Look from");
-    if (ImGui::Button("left")) look_from(kFromLeft);
-    ImGui::SameLine();
-    if (ImGui::Button("right")) look_from({-0.94, -0.25, 0.22});
-    ImGui::SameLine();
-    if (ImGui::Button("front")) look_from({0, -1, 0.1});
-    ImGui::SameLine();
-    if (ImGui::Button("above")) look_from({0, -0.05, 1});
+    draw_scope_panel(scope_, stereo_, scope_scene());
     ImGui::Separator();
     draw_status(rehearsal, tick);  // below the buttons, which its lines would move
     draw_sound(sound_);
@@ -556,6 +572,10 @@ class RehearsalWindow {
     state.centre_mm = control_.centre_mm();
     state.radius_mm = control_.radius_mm();
     state.goal_mm = control_.goal_mm();
+    state.view = scope_.view();
+    state.pixels_per_mm = scope_.view().pixels_per_mm(scope_.area);
+    state.camera_moves = scope_.control.flies();
+    state.stereo = static_cast<int>(stereo_.params.mode);
     state.width = width_;
     state.height = height_;
     if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && !control_.failure()) {
@@ -593,6 +613,9 @@ class RehearsalWindow {
   std::uint64_t pictures_ = 0;
   bool show_help_ = false, screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
+  ScopeInput scope_;
+  StereoScreen stereo_;
+  TrialOverlay trial_;
   CameraNotes camera_notes_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "osteo/bone/rigid_transform.h"
 #include "osteo/bone/saw.h"
+#include "osteo/camera/microscope.h"
 #include "osteo/haptics/stream.h"
 #include "osteo/view/quality.h"
 
@@ -28,6 +29,10 @@ struct WindowState {
   RigidTransform plate;
   Vec3 eye, centre_mm, goal_mm;
   double radius_mm = 0;
+  ScopeView view;
+  double pixels_per_mm = 0;
+  bool camera_moves = false;  // flies
+  int stereo = 0;             // StereoMode
   int width = 0, height = 0;
   TickRecord tick;
   double removed_mm3 = 0;

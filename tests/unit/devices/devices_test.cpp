@@ -261,6 +261,41 @@ TEST(ClosedLoop, AVirtualArmRestsOnBone) {
   EXPECT_LT(fastest, 0.3) << "mm in 4 ms: it shakes";
 }
 
+// The camera has the hand: the drill rests where it is, the motors too, and the arm's own motion is told. Then it is the drill's again,
+// without a jump.
+TEST(Lending, AnArmRestsAndTellsOfItsHand) {
+  const WoodenHapticsGeometry geometry;
+  test::VirtualArm arm(geometry, {0, 0, 8});
+  WoodenHapticsDevice device(arm.opener(), geometry, Loop::map(), 3, nullptr);
+  DeviceSample sample;
+  const auto until = [&](const std::function<bool()>& done) {
+    for (int i = 0; i < 5000 && !done(); ++i) {
+      sample = device.read(0, 1e-3, {});
+      device.feel({0, 0, 1}, {}, 0);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return done();
+  };
+  const auto place = [&] { return from_floats(sample.position_mm); };
+  arm.set_hand({0, 0, 8}, 0.5);
+  ASSERT_TRUE(until([&] { return device.motion().hand_mm && length(arm.force_n()) > 0.5; }));
+  device.lend(true);
+  const DeviceMotion before = device.motion();
+  const Vec3 rests = place();
+  arm.set_hand({0, 20, 30}, 0.5);
+  ASSERT_TRUE(until([&] { return length(arm.force_n()) < 1e-9; })) << "motors rest";
+  ASSERT_TRUE(until([&] { return length(*device.motion().hand_mm - *before.hand_mm) > 20; }));
+  EXPECT_LT(length(place() - rests), 0.5);
+  EXPECT_LT((*device.motion().hand_mm - *before.hand_mm).x, -5) << "its left is the user's left";
+  EXPECT_GT((*device.motion().hand_mm - *before.hand_mm).y, 5) << "up is up";
+  int more = 0;
+  ASSERT_TRUE(until([&] { return ++more > 500; }));  // the arm has come to rest
+  const Vec3 lent = place();
+  device.lend(false);
+  sample = device.read(0, 1e-3, {});
+  EXPECT_LT(length(place() - lent), 2) << "it goes on from where it was";
+}
+
 TEST(ClosedLoop, UnpluggedAndPluggedInAgain) {
   Loop l;
   l.loop.start();

@@ -11,7 +11,7 @@ namespace {
 TEST(CameraNotes, ChangesAloneAndAtMostSixtyASecond) {
   CameraNotes notes;
   const int first = 0, second = 0;
-  CameraView view{{1, 2, 3}, {0, 0, 0.5}, {0, 0, 1}, 30, 12.5};
+  CameraView view{{1, 2, 3}, {0, 0, 0.5}, {0, 0, 1}, 30, 12.5, 6};
   const auto note = notes.next(view, 0, &first);
   ASSERT_TRUE(note);
   const auto j = nlohmann::json::parse(*note);
@@ -19,6 +19,7 @@ TEST(CameraNotes, ChangesAloneAndAtMostSixtyASecond) {
   EXPECT_EQ(j["target_mm"][2], 0.5);
   EXPECT_EQ(j["view_angle_deg"], 30);
   EXPECT_EQ(j["pixels_per_mm"], 12.5);
+  EXPECT_EQ(j["magnification"], 6);
   EXPECT_FALSE(notes.next(view, 10, &first)) << "nothing changed";
   // A thousand pictures a second for a second.
   int told = 0;

@@ -73,9 +73,21 @@ TEST(Keyboard, AShortPressIsNotMissed) {
   const auto presses = k.frame(false);
   ASSERT_EQ(presses.size(), 2U);
   EXPECT_EQ(presses[1].command, Command::saw);
+  EXPECT_FALSE(presses[1].shift);
   EXPECT_TRUE(k.held(Command::suck));
   EXPECT_TRUE(k.frame(false).empty());
   EXPECT_FALSE(k.held(Command::suck));
+}
+
+TEST(Keyboard, ShiftBelongsToItsPress) {
+  Keyboard k;
+  k.on('G', Event::pressed, true);
+  k.on('G', Event::released);
+  k.on('G', Event::pressed);
+  const auto presses = k.frame(false);
+  ASSERT_EQ(presses.size(), 2U);
+  EXPECT_TRUE(presses[0].shift);
+  EXPECT_FALSE(presses[1].shift);
 }
 
 TEST(Keyboard, AHeldKeyIsHeldUntilItIsLetGo) {

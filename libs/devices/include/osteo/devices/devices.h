@@ -3,6 +3,7 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "osteo/devices/hid_link.h"
@@ -82,9 +83,44 @@ class FootPedal final : HidHandler {
   return hand == 0 ? 1U : 4U;
 }
 
+/// How a device's own hand is, in its own right, up and towards the user.
+struct DeviceMotion {
+  std::optional<Vec3> hand_mm, axis;  ///< of an arm that has been heard of: place; handle, unit
+  std::optional<Vec3> push;           ///< of a cap: deflection, 0 to 1
+  Vec3 turn;                          ///< its twist, right-handed
+};
+
+/// A device whose hand can be lent to the camera: meanwhile its samples rest where they are, the pedal up, and motors rest. From any
+/// thread.
+class LendsHand {
+ public:
+  virtual ~LendsHand() = default;
+  void lend(bool on) noexcept { lent_ = on; }
+  [[nodiscard]] virtual DeviceMotion motion() const noexcept = 0;
+
+ protected:
+  std::atomic<bool> lent_{false};
+};
+
+/// A SpaceMouse that is not the drill: of its own thread.
+class CameraPuck final : HidHandler {
+ public:
+  explicit CameraPuck(HidLink::Open open) : link_(std::move(open), *this, 100) {}
+  [[nodiscard]] DeviceMotion motion() const noexcept;
+
+ private:
+  void report(HidPort&, std::span<const std::byte> report) override {
+    if (decode_space_mouse(report, own_)) shared_.store(own_);
+  }
+  void gone() override { shared_.store(own_ = {}); }
+  SpaceMouseState own_;
+  Seqlock<SpaceMouseState> shared_;
+  HidLink link_;
+};
+
 /// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 presses the pedal; so does a real one, by its
 /// switch pedal_bit().
-class SpaceMouseDevice final : public Device, HidHandler {
+class SpaceMouseDevice final : public Device, public LendsHand, HidHandler {
  public:
   /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
   SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal, std::size_t hand = 0);
@@ -96,6 +132,7 @@ class SpaceMouseDevice final : public Device, HidHandler {
   }
   Led led() noexcept override { return hand_.led(); }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
+  [[nodiscard]] DeviceMotion motion() const noexcept override;
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const override { return trouble_of(link_, pedal_); }
 
@@ -120,7 +157,7 @@ class SpaceMouseDevice final : public Device, HidHandler {
 /// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the latest force, bridged by
 /// its plane of contact when the servo is late; the servo reads the latest pose. Motors rest until the servo speaks, and when it falls
 /// silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the clutch of every arm.
-class WoodenHapticsDevice final : public Device, HidHandler {
+class WoodenHapticsDevice final : public Device, public LendsHand, HidHandler {
  public:
   WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal,
                       std::size_t hand = 0);
@@ -128,6 +165,7 @@ class WoodenHapticsDevice final : public Device, HidHandler {
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   void feel(Vec3 force_n, Vec3 normal, double stiffness_n_per_mm) noexcept override;
   [[nodiscard]] DeviceTraits traits() const override;
+  [[nodiscard]] DeviceMotion motion() const noexcept override;
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const override { return trouble_of(link_, pedal_); }
   /// Reports too short to be one; they are passed over.

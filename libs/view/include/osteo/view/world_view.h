@@ -37,6 +37,8 @@ class WorldView {
   /// off by at most kCoarse of a voxel, once another thread has made them. True: nothing is to come but by a change of scene or camera.
   bool rest(int width, int height, bool coarse = true);
   static constexpr double kCoarse = 0.35;
+  /// All is drawn again, for pictures from elsewhere than the camera rests.
+  void wake() { wake(false); }
   [[nodiscard]] bool making_coarse() const { return coarsening_.valid(); }
   [[nodiscard]] std::size_t drawn_triangles() const;
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "osteo/base/error.h"
+#include "osteo/camera/stereo.h"
 #include "osteo/data/sparse_grid.h"
 #include "osteo/data/volume.h"
 #include "osteo/dicom/verdict.h"
@@ -28,6 +29,8 @@ struct WindowOptions {
   bool approval_ended = false;       ///< by a later change: said in another colour
   std::vector<SparseGrid> bone;      ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
   std::optional<Image> ct;           ///< the scan of the case, for its cuts; none: they show what the case keeps of it
+  StereoParams stereo;
+  bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
 };
 
@@ -36,6 +39,15 @@ struct HandView {
   Vec3 eye;   ///< from the bone towards who looks
   Vec3 axis;  ///< along the handle
   int tool = 3;
+};
+
+/// Hardware for the camera, as it is now. Lengths, pushes and turns in the device's own right, up and towards the user.
+struct CameraDevices {
+  bool pedal = false;             ///< its brake is released, as by the key
+  std::optional<Vec3> hand_mm;    ///< of an arm whose hand is lent to the camera
+  std::optional<Vec3> hand_axis;  ///< its handle
+  std::optional<Vec3> push;       ///< deflection of a puck that is not the drill now, 0 to 1
+  Vec3 turn;                      ///< and its twist
 };
 
 /// What the window asks of whoever runs the rehearsal. After save, and after anything that throws, nothing runs.
@@ -50,6 +62,9 @@ struct WindowActions {
   std::function<std::filesystem::path()> folder;
   /// Why the session that runs has to end now (its recording has): the window saves it and says so.
   std::function<std::optional<Error>()> failure;
+  /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves the camera. May be
+  /// empty.
+  std::function<CameraDevices(bool lend)> camera;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };
