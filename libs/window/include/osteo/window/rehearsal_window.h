@@ -44,6 +44,8 @@ struct WindowActions {
   std::function<std::filesystem::path()> folder;
   /// Why the session that runs has to end now (its recording has): the window saves it and says so.
   std::function<std::optional<Error>()> failure;
+  /// The pedal of a hand that moves by itself but has none of its own, by the window's keys and buttons; may be empty.
+  std::function<void(bool drill)> press;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };
