@@ -6,13 +6,14 @@
 #include "osteo/camera/stereo.h"
 #include "osteo/haptics/contact.h"
 #include "osteo/view/quality.h"
+#include "osteo/marker/device.h"
 
 namespace osteo {
 
-enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics };
+enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics, marker };
 template <>
 struct EnumNames<Hand> {
-  static constexpr std::array<std::string_view, 4> values{"auto", "mouse", "spacemouse", "woodenhaptics"};
+  static constexpr std::array<std::string_view, 5> values{"auto", "mouse", "spacemouse", "woodenhaptics", "marker"};
 };
 
 /// What moves the second hand.
@@ -32,6 +33,11 @@ struct WindowFlags {
   std::string settings;
   Hand device = Hand::automatic;
   std::string arm;
+  std::string camera = "camera.json";
+  std::string pen;
+  std::string video = "/dev/video0";
+  CameraPlace camera_place = CameraPlace::facing;
+  double hand_scale = 1;
   SecondHand second_device = SecondHand::keys;
   std::string second_instrument = "sucker 10 Fr";
   bool dust = false;
@@ -56,8 +62,15 @@ struct WindowFlags {
     visit({"shape", "of the burr at the start"}, p.shape);
     visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
-    visit({"device", "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices')"}, p.device);
+    visit({"device", "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a pen before a camera, of pose "
+           "only (docs/marker.md)"}, p.device);
     visit({"arm", "in the window, geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
+    visit({"camera", "of the marker: its lens, made by calibrate-camera"}, p.camera);
+    visit({"pen", "of the marker: made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the prism)"}, p.pen);
+    visit({"video", "of the marker: where its camera is; a video stands for one"}, p.video);
+    visit({"camera_place", "of the marker: facing you from the screen, above the desk (its picture's top away from you), or behind you"},
+          p.camera_place);
+    visit({"hand_scale", "of the marker: mm in the scene for a mm of the hand", "", 0.05, 10}, p.hand_scale);
     visit({"second_device",
            "in the window, what moves the second hand; keys: a sucker and water come beside the drill while V and I are held, with --dust"},
           p.second_device);

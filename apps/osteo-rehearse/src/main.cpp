@@ -13,6 +13,7 @@
 #include "osteo/devices/devices.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
+#include "osteo/marker/device.h"
 #include "osteo/scene/approval.h"
 #include "osteo/scene/free_ways.h"
 #include "osteo/scene/session_folder.h"
@@ -48,6 +49,7 @@ class Hands {
                                                                  : Hand::mouse;
     second_tool_ = static_cast<std::uint8_t>(instrument_index(flags.second_instrument));
     if (!flags.arm.empty()) geometry_ = load_woodenhaptics(flags.arm);
+    if (hand_ == Hand::marker) look_for_pen(flags);
     // One that moves no hand moves the camera.
     if (puck && hand_ != Hand::spacemouse && second_ != Hand::spacemouse) puck_ = std::make_unique<CameraPuck>(open_first(is_space_mouse));
   }
@@ -91,7 +93,23 @@ class Hands {
            (pedal_ && (hand_ != Hand::mouse || second_ != Hand::mouse) ? " and pedal" : "") + (puck_ ? "; camera: spacemouse" : "");
   }
 
+  /// Keys and buttons of the window stand in for the pedal of a hand that has none of its own.
+  void press(bool drill) const {
+    if (const auto pen = pen_.lock()) pen->press(drill);
+  }
+
  private:
+  // One camera for all sessions: it takes a second to open. What is wrong with the files is an error now; a camera that is not there is
+  // waited for, and the window says so.
+  void look_for_pen(const WindowFlags& flags) {
+    camera_ = load_camera(flags.camera);
+    const Pen pen = flags.pen.empty() ? Pen{} : load_pen(flags.pen);
+    camera_place_ = flags.camera_place;
+    hand_scale_ = flags.hand_scale;
+    link_ = std::make_shared<PenLink>(
+        [from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_, pen);
+  }
+
   // Two devices of a kind: the first of them is the first hand's.
   [[nodiscard]] std::unique_ptr<Device> make_one(Hand kind, std::size_t number, const HandGoal& start, Vec3 near_mm) const {
     const int before = number > 0 && hand_ == kind ? 1 : 0;
@@ -99,6 +117,13 @@ class Hands {
     if (kind == Hand::spacemouse) {
       return std::make_unique<SpaceMouseDevice>(open_first(is_space_mouse, before), start,
                                                 Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get(), number);
+    }
+    if (kind == Hand::marker) {
+      const Mat3 scene_from_desk{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, desk = desk_from_camera(camera_place_);
+      const Mat3 scene_from_camera{{scene_from_desk * desk.column[0], scene_from_desk * desk.column[1], scene_from_desk * desk.column[2]}};
+      auto device = std::make_unique<MarkerDevice>(link_, camera_, start, scene_from_camera, hand_scale_, pedal_.get(), number);
+      pen_ = device->keys();
+      return device;
     }
     if (kind == Hand::woodenhaptics) {
       const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
@@ -114,6 +139,11 @@ class Hands {
   int found_ = 0;
   std::uint8_t second_tool_ = 0;
   WoodenHapticsGeometry geometry_;
+  CameraModel camera_;
+  CameraPlace camera_place_ = CameraPlace::facing;
+  double hand_scale_ = 1;
+  std::shared_ptr<PenLink> link_;
+  mutable std::weak_ptr<HandKeys> pen_;
   std::unique_ptr<FootPedal> pedal_;
   std::unique_ptr<CameraPuck> puck_;
 };
@@ -216,6 +246,7 @@ class Sitting {
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] std::string device() const { return hands_.name(); }
   [[nodiscard]] CameraDevices camera(bool lend) const { return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend); }
+  void press(bool drill) const { hands_.press(drill); }
   /// Of any session so far, ticks were not recorded.
   [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
 
@@ -302,6 +333,7 @@ struct WindowCommand {
     actions.folder = [&] { return sitting.folder(); };
     actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
     actions.camera = [&](bool lend) { return sitting.camera(lend); };
+    actions.press = [&](bool drill) { sitting.press(drill); };
     actions.stop = [&] { return io.context.cancelled(); };
     g_sitting = &sitting;
     int gl_errors = 0;

@@ -8,6 +8,8 @@
 #include "osteo/haptics/contact.h"
 #include "osteo/image/bone_threshold.h"
 #include "osteo/image/crop.h"
+#include "osteo/marker/body.h"
+#include "osteo/marker/sheet.h"
 #include "window_flags.h"
 
 namespace osteo {
@@ -80,6 +82,78 @@ struct DevicesCommand {
   static void describe(Params& p, auto& visit) {
     visit({"watch", "print what the devices report for this long", "s", 0, 3600}, p.watch);
     visit({"recording", "instead: decode a recording made with hid-recorder"}, p.recording);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+/// Markers are printed, camera and pen calibrated.
+struct MarkersCommand {
+  struct Params {
+    Paper paper = Paper::a4;
+    int pen = 1;
+    int page = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"paper", "a4 or letter"}, p.paper);
+    visit({"pen", "which set of markers: another for each pen that one camera sees", "", 1, PenBody::kMostPens}, p.pen);
+    visit({"page", "of a .png: 1 the pen's, 2 the plate", "", 1, kMarkerPages}, p.page);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct CalibrateCameraCommand {
+  struct Params {
+    std::string out = "camera.json";
+    double seconds = 60;
+    int width = 1280;
+    int height = 720;
+    double fps = 30;
+    double latency_ms = -1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "the camera as JSON (also -o)"}, p.out);
+    visit({"seconds", "from a camera: for this long", "s", 1, 3600}, p.seconds);
+    visit({"width", "asked of a camera; files have their own", "pixels", 160, 8192}, p.width);
+    visit({"height", "asked of a camera; files have their own", "pixels", 120, 8192}, p.height);
+    visit({"fps", "pictures a second that it is asked for, here and later", "Hz", 1, 240}, p.fps);
+    visit({"latency_ms", "from the middle of an exposure until the picture is here, where it is known (-1: one period is taken)", "ms", -1, 500},
+          p.latency_ms);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct CalibratePenCommand {
+  struct Params {
+    std::string camera = "camera.json";
+    std::string out = "pen.json";
+    int pen = 1;
+    double ruler_mm = 100;
+    double seconds = 15;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"camera", "made by calibrate-camera"}, p.camera);
+    visit({"out", "the pen as JSON (also -o)"}, p.out);
+    visit({"pen", "which set of markers it carries", "", 1, PenBody::kMostPens}, p.pen);
+    visit({"ruler_mm", "how long the line of 100 mm on its page came out", "mm", 80, 120}, p.ruler_mm);
+    visit({"seconds", "from a camera: for this long", "s", 1, 3600}, p.seconds);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct TrackPenCommand {
+  struct Params {
+    std::string camera = "camera.json";
+    std::string pen;
+    double seconds = 10;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"camera", "made by calibrate-camera"}, p.camera);
+    visit({"pen", "made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the prism)"}, p.pen);
+    visit({"seconds", "from a camera: for this long", "s", 0.1, 86400}, p.seconds);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -30,6 +30,10 @@ cli::Program make_osteo_program() {
   p.add<HeatCommand>();
   p.add<ExperimentCommand>();
   p.add<DevicesCommand>();
+  p.add<MarkersCommand>();
+  p.add<CalibrateCameraCommand>();
+  p.add<CalibratePenCommand>();
+  p.add<TrackPenCommand>();
   p.add<DoctorCommand>();
   p.add<DemoCommand>();
   p.add<BenchCommand>();

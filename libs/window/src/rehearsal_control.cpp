@@ -142,7 +142,10 @@ void RehearsalControl::send_goal(double seconds) {
     return;
   }
   auto* const mouse = dynamic_cast<MouseDevice*>(&device);
-  if (mouse == nullptr) return;  // it moves and drills by itself
+  if (mouse == nullptr) {  // it moves by itself, and drills by a pedal of its own where it has one
+    if (actions_.press) actions_.press(latched_ || held_);
+    return;
+  }
   turn_handle(seconds);
   goal_.axis = to_floats(axis_);
   goal_.tool = static_cast<std::uint8_t>(tool_);

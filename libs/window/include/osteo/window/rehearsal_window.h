@@ -65,6 +65,8 @@ struct WindowActions {
   /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves the camera. May be
   /// empty.
   std::function<CameraDevices(bool lend)> camera;
+  /// The pedal of a hand that moves by itself but has none of its own, by the window's keys and buttons; may be empty.
+  std::function<void(bool drill)> press;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
 };
