@@ -268,7 +268,7 @@ void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, s
     const std::string name = scene_.structures->name_of(scene_.structures->values()[s]);
     const ProcedureStructure* const p = scene_.procedure == nullptr ? nullptr : scene_.procedure->find(name);
     // What is to be opened is not injured by that.
-    if (p != nullptr && p->role == StructureRole::enter) continue;
+    if (p != nullptr && p->role == ProcedureRole::enter) continue;
     if (o.least_mm < scene_.structures->reach_mm()) {
       values.push_back(measured("clearance_mm", o.least_mm, name));
     } else {

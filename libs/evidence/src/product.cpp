@@ -109,7 +109,7 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   };
   for (const RemovedVoxel& v : removed_) take(v.own_mm);
   for (std::size_t p = 0; p < face_.points_mm.size(); ++p) {
-    if (const ProcedureStructure* const s = procedure_.find(structures_.name_of(face_of_[p])); s != nullptr && s->role != StructureRole::enter)
+    if (const ProcedureStructure* const s = procedure_.find(structures_.name_of(face_of_[p])); s != nullptr && s->role != ProcedureRole::enter)
       take(from_floats(face_.points_mm[p]));
   }
   if (lo.x > hi.x) take(bone.centre_mm());
@@ -145,7 +145,7 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   std::array<bool, 256> blocks{};
   for (const std::uint8_t v : structures_.values()) {
     const ProcedureStructure* const s = procedure_.find(structures_.name_of(v));
-    blocks[v] = s == nullptr || s->role != StructureRole::enter;
+    blocks[v] = s == nullptr || s->role != ProcedureRole::enter;
     // What the procedure does not name, and is a space, is not known to be one: it ends a cavity.
   }
   const auto nx = static_cast<std::size_t>(frame_.dims[0]);

@@ -32,7 +32,7 @@ TEST(Procedures, ThoseOfTheProjectAreRead) {
     EXPECT_EQ(p.file, name);
   }
   const Procedure ear = load_procedure(std::filesystem::path(OSTEO_SOURCE) / "pipelines/procedures/mastoidectomy.json");
-  EXPECT_EQ(ear.find("facial nerve")->role, StructureRole::never_touch);
+  EXPECT_EQ(ear.find("facial nerve")->role, ProcedureRole::never_touch);
   EXPECT_EQ(ear.items[1].threshold, 0.4);
   EXPECT_EQ(ear.items[2].threshold, usual_threshold(ItemKind::no_hole));
   EXPECT_EQ(mirrored(ear).items[1].towards[0], -ear.items[1].towards[0]);

@@ -11,7 +11,7 @@
 namespace osteo {
 
 /// What a structure is to the procedure.
-enum class StructureRole : int {
+enum class ProcedureRole : int {
   expose,       ///< to be shown, intact
   keep,         ///< to be left as it is
   thin,         ///< its wall is to be thinned, not opened
@@ -19,7 +19,7 @@ enum class StructureRole : int {
   enter,        ///< a space that is to be opened: an antrum, cells
 };
 template <>
-struct EnumNames<StructureRole> {
+struct EnumNames<ProcedureRole> {
   static constexpr std::array<std::string_view, 5> values{"expose", "keep", "thin", "never_touch", "enter"};
 };
 
@@ -34,7 +34,7 @@ struct EnumNames<ItemKind> {
 struct ProcedureStructure {
   using Params = ProcedureStructure;
   std::string name;
-  StructureRole role = StructureRole::keep;
+  ProcedureRole role = ProcedureRole::keep;
   bool optional = false;
   std::size_t line = 0;
   static void describe(Params& p, auto& visit) {
