@@ -25,6 +25,7 @@ cli::Program make_osteo_program() {
   p.add<PlanCommand>();
   p.add<RehearseCommand>();
   p.add<ReplayCommand>();
+  p.add<ScoreCommand>();
   p.add<ExportCommand>();
   p.add<SoundCommand>();
   p.add<HeatCommand>();

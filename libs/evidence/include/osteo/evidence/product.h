@@ -1,0 +1,103 @@
+// What is left at the end: the primitives of docs/evidence.md on a lattice, and the items of a scale built on them.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "osteo/base/context.h"
+#include "osteo/bone/structure_map.h"
+#include "osteo/bone/world.h"
+#include "osteo/evidence/procedure.h"
+
+namespace osteo {
+
+/// A voxel of bone that is gone, where it lay before any piece was moved.
+struct RemovedVoxel {
+  Vec3 own_mm;
+  float mm3 = 0;
+};
+
+/// Bone before and after on one lattice, in the frame of the first body, with all pieces where they lay at the beginning. All distances in
+/// mm. The lattice: cubes of the bone's voxel, of 0.5 mm where that is larger, around all that was removed and all structures named, with
+/// 5 mm around; more than kMostCells cubes make it coarser, which it says (`word`).
+/// Solid: density of at least a half, between voxels linear. Structures but those to be opened are solid too: a cavity ends at them.
+class Product {
+ public:
+  static constexpr double kBallMm = 0.5, kAroundMm = 5, kCoarsestMm = 0.5;
+  static constexpr std::size_t kMostCells = 24'000'000;
+
+  /// `before`, `after`: World; the structures must outlive this. O(cells).
+  Product(const World& before, const World& after, const StructureMap& structures, const Procedure& procedure,
+          std::vector<RemovedVoxel> removed, const Context& context = {});
+
+  struct Result {
+    const ScaleItem* item = nullptr;
+    bool measured = false, pass = false;
+    double value = 0, threshold = 0;
+    double margin = 0;               ///< (value - threshold) / spread, positive where it passes
+    std::string unit, word;          ///< why it was not measured, or what else is to be said
+    std::vector<Vec3> evidence_mm;   ///< the places that prove it: bare, left, hidden, violated, ... by kind; at most 20000
+    std::size_t evidence_count = 0;  ///< of all
+    double evidence_each = 0;        ///< mm2 or mm3 that one place stands for
+  };
+  /// `approach`: unit, from the bone to who drills, in the first body's frame: the middle of the cone of views of no_overhang; zero where it
+  /// is not known. `injured`: names of structures that a turning burr reached.
+  [[nodiscard]] Result evaluate(const ScaleItem& item, Vec3 approach, const std::vector<std::string>& injured) const;
+
+  /// Of an item that asks for no more than pieces and plates.
+  [[nodiscard]] static Result count(const ScaleItem& item, const World& world);
+
+  struct RegionResult {
+    const ProcedureRegion* region = nullptr;
+    double bone_mm3 = 0, removed_mm3 = 0;  ///< bone in it before, and how much of it is gone
+  };
+  [[nodiscard]] std::vector<RegionResult> regions() const;
+  /// Removed bone that lies in no target region; all of it where there is none.
+  [[nodiscard]] double outside_targets_mm3() const;
+  [[nodiscard]] double cavity_mm3() const;
+  [[nodiscard]] const std::string& word() const { return word_; }
+  [[nodiscard]] double spacing_mm() const { return frame_.spacing_mm.x; }
+
+ private:
+  // A triangle of a structure's face.
+  struct Patch {
+    Vec3 at_mm, normal;
+    double area_mm2 = 0;
+    double cover_mm = 0;  // to the cavity
+  };
+  [[nodiscard]] bool value_of(const std::string& name, std::uint8_t& value) const;
+  [[nodiscard]] std::vector<Patch> patch_of(std::uint8_t value, const ScaleItem& item) const;
+  [[nodiscard]] double cavity_distance_mm(Vec3 own_mm) const;
+  [[nodiscard]] double sample(const std::vector<float>& field, Vec3 own_mm) const;
+  [[nodiscard]] std::size_t cell(Vec3 own_mm) const;  // the nearest; frame_.voxel_count() outside
+  [[nodiscard]] Vec3 place(std::size_t cell) const;
+  [[nodiscard]] double distance_to(std::uint8_t value, Vec3 own_mm) const;
+  void keep(Result& r, Vec3 at) const;
+  void exposed(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured, Result& r) const;
+  void hole(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void cells_left(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Result& r) const;
+  void thinned(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void sharp(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void followed(const ScaleItem& item, std::uint8_t s, Result& r) const;
+  void margin(const ScaleItem& item, Result& r) const;
+
+  struct Box {
+    Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
+  };
+  const World& after_world_;
+  const StructureMap& structures_;
+  const Procedure& procedure_;
+  std::vector<RemovedVoxel> removed_;
+  Frame frame_;
+  std::vector<std::uint8_t> before_, after_, label_, cavity_, reached_;  // bone; structure inside which a cell lies; flags
+  std::vector<float> to_cavity_mm_;  // from centre to centre
+  std::array<Box, 256> boxes_;  // around each structure's face, by value
+  TriMesh face_;
+  std::vector<std::uint8_t> face_of_;
+  std::string word_;
+};
+
+}  // namespace osteo

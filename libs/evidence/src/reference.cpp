@@ -1,0 +1,108 @@
+#include "osteo/evidence/reference.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/base/json.h"
+
+namespace osteo {
+
+std::vector<ReferenceSession> load_reference(const std::filesystem::path& folder) {
+  const JsonFile file(read_text(folder / "reference.json"), "reference.json");
+  const std::vector<std::string> known{"osteotome_reference", "$schema", "about", "sessions"};
+  file.require_format("osteotome_reference");
+  file.allow(file.root(), "", known);
+  std::vector<ReferenceSession> sessions;
+  for (const JsonValue& v : file.list(file.need(file.root(), "", "sessions"), "sessions")) {
+    ReferenceSession s;
+    const std::string where = "session " + std::to_string(sessions.size() + 1);
+    file.read(v, where, fields_of<ReferenceSession>(s));
+    if (!std::filesystem::exists(folder / s.session / "stream.oss"))
+      throw file.wrong(v, where + ": '" + s.session + "' is no session", "name folders beside reference.json");
+    for (const ReferenceSession& o : sessions) {
+      if (o.session == s.session) throw file.wrong(v, where + ": '" + s.session + "' is there twice");
+      if (o.subject == s.subject && o.group != s.group) throw file.wrong(v, where + ": subject '" + s.subject + "' is in both groups");
+    }
+    sessions.push_back(std::move(s));
+  }
+  return sessions;
+}
+
+RegionScore score_region(const RemovedSet& session, std::span<const RemovedSet> experts, std::span<const RemovedSet> novices) {
+  struct Count {
+    std::uint32_t experts = 0, novices = 0;
+    bool here = false;
+  };
+  std::map<VoxelKey, Count> counts;
+  for (const RemovedSet& s : experts)
+    for (const VoxelKey v : s) ++counts[v].experts;
+  for (const RemovedSet& s : novices)
+    for (const VoxelKey v : s) ++counts[v].novices;
+  for (const VoxelKey v : session) counts[v].here = true;
+  RegionScore score;
+  double sum = 0, squares = 0;
+  const auto ne = static_cast<double>(experts.size()), nn = static_cast<double>(novices.size());
+  for (const auto& [voxel, c] : counts) {
+    const double pe = (c.experts + 1) / (ne + 2), pn = (c.novices + 1) / (nn + 2);
+    const double gone = std::log(pe / pn), kept = std::log((1 - pe) / (1 - pn));
+    score.log_ratio += c.here ? gone : kept;
+    if (c.here) score.thesis += gone;
+    const double w = std::abs(gone - kept);
+    sum += w;
+    squares += w * w;
+  }
+  if (squares > 0) {
+    score.effective_voxels = sum * sum / squares;
+    score.per_voxel = score.log_ratio / score.effective_voxels;
+  }
+  return score;
+}
+
+namespace {
+
+double quantile(const std::vector<double>& sorted, double q) {
+  const auto n = static_cast<double>(sorted.size());
+  return sorted[static_cast<std::size_t>(std::clamp(std::ceil(q * n - 1e-12) - 1, 0.0, n - 1))];
+}
+
+}  // namespace
+
+IsotonicQuantile::IsotonicQuantile(std::span<const Point> points, double q) {
+  std::map<long, std::vector<double>> by_step;
+  for (const Point& p : points) by_step[std::lround(std::floor(p.distance_mm / kStepMm))].push_back(p.value);
+  struct Block {
+    std::vector<long> steps;
+    std::vector<double> sorted;
+    double value = 0;
+  };
+  std::vector<Block> blocks;
+  for (auto& [step, values] : by_step) {
+    std::sort(values.begin(), values.end());
+    Block b{{step}, std::move(values), 0};
+    b.value = quantile(b.sorted, q);
+    while (!blocks.empty() && blocks.back().value >= b.value) {
+      Block& before = blocks.back();
+      std::vector<double> together;
+      together.reserve(before.sorted.size() + b.sorted.size());
+      std::merge(before.sorted.begin(), before.sorted.end(), b.sorted.begin(), b.sorted.end(), std::back_inserter(together));
+      before.steps.insert(before.steps.end(), b.steps.begin(), b.steps.end());
+      b = {std::move(before.steps), std::move(together), 0};
+      b.value = quantile(b.sorted, q);
+      blocks.pop_back();
+    }
+    blocks.push_back(std::move(b));
+  }
+  for (const Block& b : blocks)
+    for (const long s : b.steps) steps_.push_back({static_cast<double>(s) * kStepMm, b.value});
+}
+
+double IsotonicQuantile::at(double distance_mm) const {
+  if (steps_.empty()) return 0;
+  const double step = std::floor(distance_mm / kStepMm) * kStepMm;
+  const auto behind = std::upper_bound(steps_.begin(), steps_.end(), step + kStepMm / 2, [](double d, const Point& p) { return d < p.distance_mm; });
+  return behind == steps_.begin() ? steps_.front().value : (behind - 1)->value;
+}
+
+}  // namespace osteo
