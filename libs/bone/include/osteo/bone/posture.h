@@ -1,0 +1,21 @@
+// How the patient lies: which way is down in the case.
+#pragma once
+#include <array>
+#include <string_view>
+
+#include "osteo/base/param.h"
+#include "osteo/data/vec.h"
+
+namespace osteo {
+
+enum class Posture : int { supine, prone, sitting, left_side, right_side };
+template <>
+struct EnumNames<Posture> {
+  static constexpr std::array<std::string_view, 5> values{"supine", "prone", "sitting", "left_side", "right_side"};
+};
+
+/// The direction of gravity in LPS of the case, whose axes go with the head: unit. `head_turned_deg`: about the body's long axis, positive
+/// where the face turns towards the patient's left (for the right ear), negative towards the right (for the left ear).
+[[nodiscard]] Vec3 down_of(Posture posture, double head_turned_deg);
+
+}  // namespace osteo
