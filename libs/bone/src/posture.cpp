@@ -17,4 +17,12 @@ Vec3 down_of(Posture posture, double head_turned_deg) {
   return normalized({c * down.x + s * down.y, c * down.y - s * down.x, down.z});
 }
 
+PostureNow posture_of(Vec3 down) {
+  if (down.z * down.z > 0.5) return {Posture::sitting, 0};
+  const double degrees = portable::atan2(down.x, down.y) * 180 / std::numbers::pi;
+  if (degrees > 90.001) return {Posture::prone, degrees - 180};
+  if (degrees < -90.001) return {Posture::prone, degrees + 180};
+  return {Posture::supine, degrees};
+}
+
 }  // namespace osteo

@@ -4,6 +4,8 @@
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkOpenGLActor.h>
 #include <vtkPointData.h>
 #include <vtkPointGaussianMapper.h>
 #include <vtkPoints.h>
@@ -38,6 +40,18 @@ class Chance {
  private:
   std::uint64_t state_;
 };
+
+// Drawn when all else is, blended over it where nothing is in front. VTK's own translucent pass loses the depth of what is opaque where the
+// window's depth buffer has another format than the pass', and then draws water through bone.
+class LateActor : public vtkOpenGLActor {
+ public:
+  static LateActor* New();
+  vtkTypeMacro(LateActor, vtkOpenGLActor);
+  vtkTypeBool HasTranslucentPolygonalGeometry() override { return 0; }
+  int RenderOpaqueGeometry(vtkViewport*) override { return 0; }
+  int RenderOverlay(vtkViewport* viewport) override { return GetVisibility() != 0 ? vtkOpenGLActor::RenderOpaqueGeometry(viewport) : 0; }
+};
+vtkStandardNewMacro(LateActor);
 
 // Balls, drawn as discs that face the eye: round, darker at the rim, and solid.
 struct Balls {
@@ -97,7 +111,7 @@ struct DustView::Impl {
   Balls grains, drops;
   vtkNew<vtkPolyData> water_data;
   vtkNew<vtkPolyDataMapper> water_mapper;
-  vtkNew<vtkActor> water;
+  vtkNew<LateActor> water;
   vtkRenderer* renderer = nullptr;
   double cell_mm = 0.5;
   const Dust* of = nullptr;
@@ -168,11 +182,8 @@ DustView::DustView(vtkRenderer* renderer, double cell_mm) : impl_(std::make_uniq
   m.renderer = renderer;
   m.cell_mm = cell_mm;
   m.water_mapper->SetInputData(m.water_data);
-  // In front of the bone that it lies on, by less than anybody sees.
-  m.water_mapper->SetResolveCoincidentTopologyToPolygonOffset();
-  m.water_mapper->SetRelativeCoincidentTopologyPolygonOffsetParameters(-1, -2);
   m.water->SetMapper(m.water_mapper);
-  m.water->ForceTranslucentOn();
+  m.water->ForceOpaqueOn();
   m.water->PickableOff();
   vtkProperty* const p = m.water->GetProperty();
   p->BackfaceCullingOn();
@@ -187,13 +198,14 @@ DustView::DustView(vtkRenderer* renderer, double cell_mm) : impl_(std::make_uniq
       "  fragOutput0.a = clamp(fragOutput0.a + 1.2 * max(0.0, dot(fragOutput0.rgb, vec3(0.333)) - 0.85), 0.0, 1.0);\n",
       false);
   m.water->VisibilityOff();
-  for (vtkActor* const a : {m.grains.actor.Get(), m.drops.actor.Get(), m.water.Get()}) renderer->AddActor(a);
+  for (vtkActor* const a : {m.grains.actor.Get(), m.drops.actor.Get(), static_cast<vtkActor*>(m.water.Get())}) renderer->AddActor(a);
   m.grains.actor->VisibilityOff();
   m.drops.actor->VisibilityOff();
 }
 
 DustView::~DustView() {
-  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), impl_->water.Get()}) impl_->renderer->RemoveActor(a);
+  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), static_cast<vtkActor*>(impl_->water.Get())})
+    impl_->renderer->RemoveActor(a);
 }
 
 void DustView::update(const Dust& dust) {

@@ -130,7 +130,11 @@ LiquidSurface liquid_surface(const Dust& dust) {
     }
     for (std::size_t p = 0; p < sum.size(); ++p) normals[p] = normalized(sum[p]);
   }
-  for (const Vec3& n : normals) out.normals.push_back(to_floats(n));
+  constexpr double kOutMm = 0.04;  // in front of the bone that it lies on, by less than anybody sees
+  for (std::size_t p = 0; p < normals.size(); ++p) {
+    out.normals.push_back(to_floats(normals[p]));
+    out.points_mm[p] = to_floats(from_floats(out.points_mm[p]) + normals[p] * kOutMm);
+  }
   // In the air: nothing solid beside it, and less than half a cell.
   for (const std::uint32_t b : f.wet) {
     for (VoxelKey v = b * BrickGrid::kVoxels; v < (b + 1) * BrickGrid::kVoxels; ++v) {

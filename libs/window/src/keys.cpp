@@ -57,6 +57,7 @@ constexpr Key kKeys[] = {
     {kF1, Command::help},
     {'H', Command::help},
     {'Q', Command::quit},
+    {'K', Command::second_hand},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -101,7 +102,8 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Home", "view from the left", {home}},
                                               {"N", "sound on and off", {sound}},
                                               {"F1, H", "shows this, and hides it", {help}},
-                                              {"Q", "save and close", {quit}}};
+                                              {"Q", "save and close", {quit}},
+                                              {"K", "second hand: sucker, water, probe, nothing", {second_hand}}};
   return lines;
 }
 

@@ -37,6 +37,7 @@ enum class Command {
   sound,
   help,
   quit,
+  second_hand,
 };
 
 struct Key {

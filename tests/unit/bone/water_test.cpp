@@ -195,6 +195,14 @@ TEST(Water, OfAPatientThatLiesSo) {
   EXPECT_EQ(down_of(Posture::sitting, 70), (Vec3{0, 0, -1}));
   // The face to the left: the left ear (+x in LPS) is below.
   EXPECT_GT(down_of(Posture::supine, 60).x, 0.86);
+  for (const Posture p : {Posture::supine, Posture::prone, Posture::sitting, Posture::left_side, Posture::right_side}) {
+    for (const double turned : {-80.0, -20.0, 0.0, 35.0}) {
+      const Vec3 down = down_of(p, turned);
+      const PostureNow now = posture_of(down);
+      EXPECT_LE(std::abs(now.head_turned_deg), 90.01);
+      EXPECT_NEAR(length(down_of(now.posture, now.head_turned_deg) - down), 0, 1e-9) << static_cast<int>(p) << " " << turned;
+    }
+  }
   EXPECT_NEAR(length(down_of(Posture::supine, 90) - down_of(Posture::left_side, 0)), 0, 1e-12);
 }
 

@@ -19,6 +19,9 @@
 namespace osteo {
 namespace {
 
+BrickGrid wide_bowl() {
+  return test::solid(0.5, 12, [](Vec3 p) { return length(p) < 11 && p.y > -4 && !(length(p - Vec3{0, -5, 0}) < 9); });
+}
 BrickGrid bowl() {
   return test::solid(0.5, 12, [](Vec3 p) { return length(p) < 11 && !(length(p - Vec3{0, -3, 0}) < 8); });
 }
@@ -109,15 +112,24 @@ TEST(DustView, ShowsNoRows) {
 
 // A pool is seen as a surface, darker than bone where it is clear, pale where it is thick; a dry bowl shows none of it.
 TEST(DustView, WaterIsSeenAndSlurryIsPaler) {
-  const auto bone = bowl();
+  const auto bone = wide_bowl();
   const LiveSurface surface(bone, {});
-  Stage stage({0.25, -0.94, 0.25});
+  Stage stage({0.1, -0.99, 0.1});
   BoneView bone_view(stage.renderer, nullptr);
   bone_view.show(surface);
   const auto brightness = [](const Picture& p) {
     double sum = 0;
     for (int y = 140; y < 160; ++y)
       for (int x = 140; x < 160; ++x) sum += p.rgb[3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x)) + 1];
+    return sum / 400;
+  };
+  const auto warmth = [](const Picture& p) {
+    double sum = 0;
+    for (int y = 140; y < 160; ++y)
+      for (int x = 140; x < 160; ++x) {
+        const std::size_t at = 3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x));
+        sum += double{p.rgb[at] * 1.0} - p.rgb[at + 2];
+      }
     return sum / 400;
   };
   Dust dust(bone);
@@ -127,7 +139,7 @@ TEST(DustView, WaterIsSeenAndSlurryIsPaler) {
   keep(dry, "water-none.png");
   const auto pour = [&] {
     for (int s = 0; s < 80; ++s) {
-      dust.irrigate({1, -1, 1}, {0, 1, 0}, 10, 2);
+      dust.irrigate({1, -1, 1}, {0, 1, 0}, 10, 1.5);
       dust.step();
     }
     for (int s = 0; s < 300; ++s) dust.step();
@@ -144,9 +156,16 @@ TEST(DustView, WaterIsSeenAndSlurryIsPaler) {
   pour();
   const Picture thick = stage.window.render();
   keep(thick, "water-slurry.png");
-  EXPECT_GT(brightness(thick), 1.15 * brightness(clear));
+  EXPECT_GT(warmth(thick), warmth(clear) + 15) << "clear water is grey, slurry has the colour of bone";
+  // From behind the bone hides it.
+  look_at(stage.renderer, {}, 12, {0, 1, 0});
+  const Picture behind = stage.window.render();
+  keep(behind, "water-behind.png");
+  const double hidden = brightness(behind);
   dust.suck({0, 0, 0}, 14, 1e9);
   view.update(dust);
+  EXPECT_NEAR(brightness(stage.window.render()), hidden, 0.5);
+  look_at(stage.renderer, {}, 12, {0.1, -0.99, 0.1});
   EXPECT_NEAR(brightness(stage.window.render()), brightness(dry), 1);
 }
 
