@@ -1,9 +1,12 @@
 // Flags of the window: declared once, for 'osteo rehearse', which passes them on, and for osteo-rehearse.
 #pragma once
 #include <string>
+#include <vector>
 
+#include "osteo/bone/action.h"
 #include "osteo/bone/burr.h"
 #include "osteo/camera/stereo.h"
+#include "osteo/bone/posture.h"
 #include "osteo/haptics/contact.h"
 #include "osteo/view/quality.h"
 #include "osteo/marker/device.h"
@@ -41,6 +44,8 @@ struct WindowFlags {
   SecondHand second_device = SecondHand::keys;
   std::string second_instrument = "sucker 10 Fr";
   bool dust = false;
+  Posture position = Posture::supine;
+  double head_turned_deg = 0;
   double rate_hz = 1000;
   std::string resume;
   std::string scan;
@@ -76,7 +81,9 @@ struct WindowFlags {
           p.second_device);
     visit({"second_instrument", "that the second hand holds, with a device of its own: sucker 10 Fr, irrigator 2 mm, probe 1 mm, a burr"},
           p.second_instrument);
-    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off"}, p.dust);
+    visit({"dust", "bone dust: falls, piles up and hides the bone until it is sucked off; with water it becomes slurry"}, p.dust);
+    visit({"position", "how the patient lies: where dust and water fall to"}, p.position);
+    visit({"head_turned_deg", "with it: positive where the face turns towards the left shoulder", "deg", -180, 180}, p.head_turned_deg);
     visit({"rate_hz", "ticks of the servo a second", "Hz", 100, 5000}, p.rate_hz);
     visit({"resume", "go on from the end of this session"}, p.resume);
     visit(
@@ -102,5 +109,11 @@ struct WindowFlags {
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);
   }
 };
+
+/// What begins a session of these flags, at its first tick: how the patient lies, where it is not on the back.
+inline std::vector<SceneAction> first_actions(const WindowFlags& flags) {
+  if (!flags.dust || (flags.position == Posture::supine && flags.head_turned_deg == 0)) return {};
+  return {SceneAction::posture(down_of(flags.position, flags.head_turned_deg))};
+}
 
 }  // namespace osteo

@@ -37,6 +37,7 @@ _osteo() {
     "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
+    "rehearse --position") COMPREPLY=($(compgen -W "supine prone sitting left_side right_side " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
@@ -85,6 +86,7 @@ _osteo() {
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --scan --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;

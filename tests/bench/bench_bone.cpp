@@ -364,7 +364,7 @@ void bench_dust() {
     const auto t = dust.totals();
     std::printf("| %zu | %zu | %.2f | %.1f | %.2g |\n", holding, awake, 1000 * s,
                 1e9 * s / static_cast<double>(std::max<std::size_t>(awake, 1)),
-                t.added_mm3 - (t.present_mm3 + t.sucked_mm3 + t.washed_mm3 + t.fallen_mm3));
+                t.added_mm3 - (t.present_mm3 + t.slurry_mm3 + t.sucked_mm3 + t.fallen_mm3));
   }
   std::printf("\n");
 }

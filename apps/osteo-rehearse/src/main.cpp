@@ -174,6 +174,7 @@ class Sitting {
         sound_(flags.sound, flags.volume, flags.alarms) {
     options_.rate_hz = flags.rate_hz;
     options_.follow = {true, true, flags.dust};
+    options_.actions = first_actions(flags);
     options_.haptics.params.contact.method = flags.contact;
     apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
   }
@@ -292,6 +293,8 @@ struct WindowCommand {
     const Case the_case = load_case(io.arguments[0]);
     const ApprovalNow approval = approval_of(the_case.folder);
     if (p.require_approved) require_approval(approval, the_case.folder);
+    if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
+      io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
     std::optional<SparseGrid> hu;
     if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
     WindowOptions window;

@@ -118,6 +118,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds) : load_script(p.script);
   const std::vector<std::string> doubts = doubts_about(script, world, p.dust);
   for (const std::string& d : doubts) io.context.warn(d);
+  if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
+    io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
   const SessionFolder session = create_session_folder(p.out, the_case.folder, p.resume);
   const fs::path& folder = session.folder;
 
@@ -132,7 +134,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.rate_hz = p.rate_hz;
   options.session_file = session.stream();
   options.follow = {true, p.pieces, p.dust};
-  options.actions = actions_of(script, p.rate_hz);
+  options.actions = first_actions(p);
+  for (SceneAction& a : actions_of(script, p.rate_hz)) options.actions.push_back(a);
   options.soft = soft_body_of(the_case.folder);
   options.haptics.more_devices.assign(script.more_hands.size(), SpringHand::traits());
   Rehearsal rehearsal(std::move(world), devices_of(script, p.rate_hz), options, io.context);

@@ -27,7 +27,8 @@ constexpr ActionValue kPose[] = {{"x_x", "1"}, {"x_y", "1"}, {"x_z", "1"}, {"y_x
 constexpr ActionValue kSplit[] = {{"least", "mm3"}};
 constexpr ActionValue kOpen[] = {{"opening", "mm"}};
 constexpr ActionValue kSuction[] = {{"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
-constexpr ActionValue kIrrigate[] = {{"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"share", "1/s"}};
+constexpr ActionValue kIrrigate[] = {{"at_x", "mm"}, {"at_y", "mm"}, {"at_z", "mm"}, {"radius", "mm"}, {"rate", "mm3/s"}};
+constexpr ActionValue kPosture[] = {{"down_x", "1"}, {"down_y", "1"}, {"down_z", "1"}};
 constexpr ActionValue kSoftPush[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"}, {"normal_x", "1"},
                                      {"normal_y", "1"}, {"normal_z", "1"}, {"force", "N"}, {"stiffness", "N/mm"}};
 constexpr ActionValue kSetting[] = {{"value", "as the setting's"}};
@@ -106,7 +107,7 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .values = kSuction},
     {.kind = ActionKind::irrigate,
      .name = "irrigate",
-     .help = "water at a place, until the next of these; share 0: away",
+     .help = "water at a place, which falls within the radius, until the next of these; rate 0: away",
      .last_counts = true,
      .moves_dust = true,
      .values = kIrrigate},
@@ -136,6 +137,12 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .help = "the burr has taken no bone for 0.3 s: what it took since the last stroke or step is one step of undo",
      .reads_bone = true,
      .by_servo = true},
+    {.kind = ActionKind::posture,
+     .name = "posture",
+     .help = "the patient lies otherwise from here on: where dust and water fall to",
+     .last_counts = true,
+     .moves_dust = true,
+     .values = kPosture},
 }};
 
 // A kind without its row, or out of order, does not compile.
@@ -221,11 +228,17 @@ SceneAction SceneAction::suction(Vec3 nozzle_mm, double radius_mm, double mm3_pe
   return a;
 }
 
-SceneAction SceneAction::irrigate(Vec3 at_mm, double radius_mm, double share_per_s) {
+SceneAction SceneAction::irrigate(Vec3 at_mm, double radius_mm, double mm3_per_s) {
   SceneAction a = plain(ActionKind::irrigate);
   put(a.values, 0, at_mm);
   a.values[3] = radius_mm;
-  a.values[4] = share_per_s;
+  a.values[4] = mm3_per_s;
+  return a;
+}
+
+SceneAction SceneAction::posture(Vec3 down) {
+  SceneAction a = plain(ActionKind::posture);
+  put(a.values, 0, down);
   return a;
 }
 

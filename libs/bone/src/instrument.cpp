@@ -50,8 +50,8 @@ const std::vector<Instrument>& instrument_library() {
       all.push_back(std::move(i));
     }
     Instrument water = rod(InstrumentKind::irrigator, "irrigator 2 mm", 2, 2);
-    water.rate = 0.8;
-    water.reach_mm = 6;
+    water.rate = 400;
+    water.reach_mm = 15;
     all.push_back(std::move(water));
     all.push_back(rod(InstrumentKind::probe, "probe 1 mm", 1, 0.7));
     all.push_back(rod(InstrumentKind::probe, "hook 2 mm", 2, 1));

@@ -263,6 +263,10 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
         return nothing("it reaches " + format_number(a.values[3]) + " mm, but at most " + format_number(SceneAction::kMostReachMm) +
                        " mm make sense");
       break;
+    case ActionKind::posture:
+      if (const double n = length(Vec3{a.values[0], a.values[1], a.values[2]}); !(n > 0.99 && n < 1.01))
+        return nothing("what is down must be a unit direction");
+      break;
     case ActionKind::grip:
       if (!is_rigid(a.transform())) return nothing("this is no rigid motion");
       if (a.item != SceneAction::kNobody && a.item >= plate_library().size()) return nothing("there is no plate " + std::to_string(a.item));

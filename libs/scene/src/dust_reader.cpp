@@ -32,6 +32,7 @@ void DustReader::begin(const World& world) {
     }
   }
   dust_ = std::make_unique<Dust>(bones_.begin()->second.bone);
+  if (posture_.is(ActionKind::posture)) dust_->set_gravity({posture_.values[0], posture_.values[1], posture_.values[2]});
 }
 
 DustReader::Bone* DustReader::owner(VoxelKey name) {
@@ -59,6 +60,10 @@ void DustReader::remove_from_coarse(const Bone& from, VoxelKey own, float densit
 void DustReader::action(const SceneAction& action) {
   if (action.is(ActionKind::suction)) sucker_ = action;
   if (action.is(ActionKind::irrigate)) water_ = action;
+  if (action.is(ActionKind::posture)) {
+    posture_ = action;
+    dust_->set_gravity({action.values[0], action.values[1], action.values[2]});
+  }
   if (!row_of(action).changes_world) return;
   if (applied_early_ > 0) {
     --applied_early_;
@@ -119,14 +124,15 @@ void DustReader::tick(const TickRecord& tick, std::span<const VoxelChange> chang
     const Instrument& held = instrument_of(tick.device.tool);
     const Vec3 tip = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm);
     const double amount = held.rate * seconds * tick.device.pedal / 255;
-    dust_->push(held.head, tip, normalized(from_floats(tick.device.axis)));
+    const Vec3 axis = normalized(from_floats(tick.device.axis));
+    dust_->push(held.head, tip, axis);
     if (held.kind == InstrumentKind::sucker && amount > 0) dust_->suck(tip, held.reach_mm, amount);
-    if (held.kind == InstrumentKind::irrigator && amount > 0) dust_->irrigate(tip, held.reach_mm, std::min(1.0, amount));
+    if (held.kind == InstrumentKind::irrigator && amount > 0) dust_->irrigate(tip, axis * -1, held.reach_mm, amount);
   }
   if (tick.hand > 0) return;  // once for all hands
   const auto place = [](const SceneAction& a) { return Vec3{a.values[0], a.values[1], a.values[2]}; };
   if (sucker_.values[4] > 0) dust_->suck(place(sucker_), sucker_.values[3], sucker_.values[4] * seconds);
-  if (water_.values[4] > 0) dust_->irrigate(place(water_), water_.values[3], std::min(1.0, water_.values[4] * seconds));
+  if (water_.values[4] > 0) dust_->irrigate(place(water_), {}, water_.values[3], water_.values[4] * seconds);
   dust_->step();
 }
 

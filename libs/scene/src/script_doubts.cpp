@@ -69,7 +69,7 @@ std::vector<std::string> doubts_about(const Script& script, const World& world, 
   }
   const auto cleans = [](const Script::TimedAction& d) { return row_of(d.action).moves_dust; };
   if (!dust && std::any_of(script.actions.begin(), script.actions.end(), cleans))
-    doubts.emplace_back("the script sucks off or washes away dust, but there is none: add --dust");
+    doubts.emplace_back("the script sucks off dust, pours water or turns the patient, but there is no dust: add --dust");
   return doubts;
 }
 

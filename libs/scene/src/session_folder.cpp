@@ -271,9 +271,15 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   if (s.dust) {
     j["dust_mm3"] = {{"made", s.dust->added_mm3},
                      {"lying", s.dust->present_mm3},
+                     {"in_slurry", s.dust->slurry_mm3},
                      {"sucked_off", s.dust->sucked_mm3},
-                     {"washed_away", s.dust->washed_mm3},
                      {"fallen_out_of_reach", s.dust->fallen_mm3}};
+    if (s.dust->poured_mm3 > 0)
+      j["water_mm3"] = {{"poured", s.dust->poured_mm3},
+                        {"standing", s.dust->water_mm3},
+                        {"sucked_off", s.dust->water_sucked_mm3},
+                        {"dried", s.dust->dried_mm3},
+                        {"run_off", s.dust->run_off_mm3}};
   }
   if (anatomy.structures) j["structures"] = structures_of(s.structures, *anatomy.structures, rate_hz);
   if (s.loop) {

@@ -14,6 +14,7 @@
 #include "osteo/base/portable_math.h"
 #include "osteo/bone/instrument.h"
 #include "osteo/bone/plates.h"
+#include "osteo/bone/posture.h"
 #include "osteo/haptics/haptic_setup.h"
 
 namespace osteo {
@@ -200,11 +201,21 @@ struct Suction {
 struct Irrigate {
   static constexpr const char *kName = "irrigate", *kHelp = "water, until the next of these";
   Triple at_mm{};
-  double radius_mm = 6, share_per_s = 0.8;
+  double radius_mm = 15, mm3_per_s = 400;
   static void describe(Irrigate& p, auto& visit) {
     visit({"at_mm", "where, LPS", "mm", -kFarMm, kFarMm}, p.at_mm);
-    visit({"radius_mm", "how far it reaches", "mm", 0.1, SceneAction::kMostReachMm}, p.radius_mm);
-    visit({"share_per_s", "of the dust that it carries away; 0: away", "1/s", 0, 1000}, p.share_per_s);
+    visit({"radius_mm", "how far it falls at most before it spreads", "mm", 0.1, SceneAction::kMostReachMm}, p.radius_mm);
+    visit({"mm3_per_s", "of water; 0: away", "mm3/s", 0, 1e5}, p.mm3_per_s);
+  }
+};
+
+struct Patient {
+  static constexpr const char *kName = "patient", *kHelp = "lies so from here on: where dust and water fall to";
+  Posture position = Posture::supine;
+  double head_turned_deg = 0;
+  static void describe(Patient& p, auto& visit) {
+    visit({"position", "of the patient"}, p.position);
+    visit({"head_turned_deg", "positive: the face towards the left shoulder", "deg", -180, 180}, p.head_turned_deg);
   }
 };
 
@@ -220,7 +231,7 @@ struct Set {
   static void describe(Set& p, auto& visit) { HapticsParams::describe(p.params, visit); }
 };
 
-using Forms = std::tuple<Saw, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Undo, Set>;
+using Forms = std::tuple<Saw, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
 
 template <class T>
 std::vector<FieldRef> fields_in(T& part) {
@@ -468,8 +479,11 @@ class ScriptReader {
     sucking_ = s.mm3_per_s;
   }
   void act(double t, const Irrigate& w, const JsonValue& j, const std::string& where) {
-    if (w.share_per_s > 0) must_be_somewhere(j, where);
-    add(t, SceneAction::irrigate(vec(w.at_mm), w.radius_mm, w.share_per_s));
+    if (w.mm3_per_s > 0) must_be_somewhere(j, where);
+    add(t, SceneAction::irrigate(vec(w.at_mm), w.radius_mm, w.mm3_per_s));
+  }
+  void act(double t, const Patient& p, const JsonValue&, const std::string&) {
+    add(t, SceneAction::posture(down_of(p.position, p.head_turned_deg)));
   }
   void act(double t, const Undo&, const JsonValue&, const std::string&) { add(t, SceneAction::plain(ActionKind::undo)); }
 

@@ -100,7 +100,8 @@ HapticSetup setup_of(const ordered_json& j, std::vector<std::string>& unknown) {
 ordered_json instruments_json() {
   ordered_json j = ordered_json::array();
   const auto shape = [](const RoundCone& c) -> ordered_json {
-    return {{"start_mm", c.start_mm}, {"length_mm", c.length_mm}, {"start_radius_mm", c.start_radius_mm}, {"end_radius_mm", c.end_radius_mm}};
+    return {
+        {"start_mm", c.start_mm}, {"length_mm", c.length_mm}, {"start_radius_mm", c.start_radius_mm}, {"end_radius_mm", c.end_radius_mm}};
   };
   for (const Instrument& i : instrument_library()) {
     ordered_json one{{"name", i.name},
@@ -200,8 +201,10 @@ std::string header_json(const SessionHeader& h) {
   j["rate_hz"] = h.rate_hz;
   j["hands"] = h.haptics.hands();
   j["dust"] = h.dust;
+  if (h.dust) j["dust_model"] = h.dust_model;
   j["kernels"] = {{"burrs", h.kernels.burrs}, {"contact", h.kernels.contact}, {"scene", h.kernels.scene}};
-  for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()}) j["records"][std::string(t->name)] = record_json(*t);
+  for (const RecordTable* const t : {&tick_table(), &change_table(), &action_record_table()})
+    j["records"][std::string(t->name)] = record_json(*t);
   j["records"]["note"] = {{"part", kNotesPart}, {"text", true}, {"meaning", "a line of JSON each: tick, kind, value"}};
   for (std::uint32_t kind = 1; name_of(static_cast<ActionKind>(kind)) != "?"; ++kind)
     j["actions"][std::to_string(kind)] = name_of(static_cast<ActionKind>(kind));
@@ -225,6 +228,7 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
   h.bone_hash = j.at("bone_hash");
   h.rate_hz = j.at("rate_hz");
   h.dust = j.value("dust", false);
+  h.dust_model = j.value("dust_model", 1);
   if (!(h.rate_hz > 0)) throw Error(ExitCode::corrupt, name + " tells of no rate");
   const auto& k = j.at("kernels");
   h.kernels = {k.at("burrs"), k.at("contact"), k.at("scene")};

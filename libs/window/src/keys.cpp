@@ -86,6 +86,7 @@ constexpr Key kKeys[] = {
     {kKeypad6, Command::orbit_right, Key::When::held},
     {kKeypad8, Command::orbit_up, Key::When::held},
     {kKeypad2, Command::orbit_down, Key::When::held},
+    {'K', Command::second_hand},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -146,7 +147,8 @@ const std::vector<HelpLine>& help_lines() {
                                               {"O", "mouse or device move the camera; with Shift turn it", {guide_camera}},
                                               {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
                                               {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
-                                              {"Backspace", "takes back the camera's last move", {camera_back}}};
+                                              {"Backspace", "takes back the camera's last move", {camera_back}}},
+                                              {"K", "second hand: sucker, water, probe, nothing", {second_hand}}};
   return lines;
 }
 

@@ -52,6 +52,7 @@ enum class Command {
   orbit_right,
   orbit_up,
   orbit_down,
+  second_hand,
 };
 
 struct Key {

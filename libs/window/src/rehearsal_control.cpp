@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <new>
 
-#include "osteo/grid/brick_places.h"
 #include "osteo/base/error.h"
+#include "osteo/grid/brick_places.h"
 
 namespace osteo {
 
@@ -106,8 +106,8 @@ HandPose RehearsalControl::hand_pose() const {
 }
 
 FreeWays RehearsalControl::free_ways(bool whole_tool) const {
-  ToolSkin skin =
-      plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip()) : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
+  ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
+                                  : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
   std::optional<FreeWays> ways;
   rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
@@ -298,6 +298,9 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
     case Command::reset:
       reset();
       return true;
+    case Command::second_hand:
+      take_next_second();
+      return true;
     default:
       return false;
   }
@@ -322,21 +325,42 @@ void RehearsalControl::hold(const HandInput& input) {
   send_goal(input.seconds);
 }
 
+// What the second hand may hold, in turn; the first: nothing.
+static constexpr const char* kSecond[] = {"", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm"};
+
+void RehearsalControl::take_next_second() {
+  if (rehearsal().hands() < 2) {
+    say("there is no second hand: --dust, or --second-device");
+    return;
+  }
+  second_ = (second_ + 1) % std::size(kSecond);
+  Device& device = rehearsal().device(1);
+  if (dynamic_cast<MouseDevice*>(&device) == nullptr) {
+    second_ = std::max<std::size_t>(second_, 1);
+    device.set_tool(static_cast<std::uint8_t>(instrument_index(kSecond[second_])));
+  }
+  say(second_ == 0 ? "second hand: nothing" : std::string("second hand: ") + kSecond[second_]);
+}
+
 void RehearsalControl::wash(bool suck, bool wash) {
+  second_empty_ = false;
   auto* const hand = rehearsal().hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal().device(1)) : nullptr;
   if (hand == nullptr) return;
-  static const auto sucker = static_cast<std::uint8_t>(instrument_index("sucker 10 Fr"));
-  static const auto water = static_cast<std::uint8_t>(instrument_index("irrigator 2 mm"));
   sucking_ = suck;
   washing_ = wash;
+  const bool works = suck || wash;
+  second_empty_ = !works && second_ == 0;
   const TickRecord tick = rehearsal().latest();
   HandGoal goal;
-  goal.tool = wash && !suck ? water : sucker;
-  goal.pedal = suck || wash ? 255 : 0;
+  goal.tool = static_cast<std::uint8_t>(instrument_index(suck   ? kSecond[1]
+                                                         : wash ? kSecond[2]
+                                                                : kSecond[std::max<std::size_t>(second_, 1)]));
+  goal.pedal = works ? 255 : 0;
   goal.axis = to_floats(normalized(view_.right - view_.forward));
   const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
   goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + view_.right * gap;
-  if (!suck && !wash) goal.position_mm += view_.right * 30 - view_.forward * 40;
+  // Held ready beside it, or put away.
+  if (!works) goal.position_mm += second_ > 0 ? view_.right * 8 - view_.forward * 6 : view_.right * 30 - view_.forward * 40;
   hand->set_goal(goal);
 }
 

@@ -74,10 +74,16 @@ class RehearsalControl {
   bool command(const Keyboard::Press& press, const std::optional<Vec3>& direction);
   /// After all of a frame's mouse and keys: moves the hand on.
   void hold(const HandInput& input);
-  /// The second hand, where no device moves it: a sucker or water beside the burr, else out of the way.
+  /// The second hand, where no device moves it: what it holds is beside the burr, a sucker or water while one of the two is asked for,
+  /// else out of the way.
   void wash(bool suck, bool wash);
   [[nodiscard]] bool sucking() const { return sucking_; }
   [[nodiscard]] bool washing() const { return washing_; }
+
+  /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three.
+  void take_next_second();
+  /// Nothing is in it, and nothing of it is to be drawn.
+  [[nodiscard]] bool second_hand_empty() const { return second_empty_; }
 
   // --- what is told
   void say(const std::string& text);  ///< also a note of the session
@@ -121,7 +127,8 @@ class RehearsalControl {
   std::optional<Leading> leading_;
   std::optional<Error> failure_, lost_;
   bool ran_ = false, sucking_ = false, washing_ = false, latched_ = false, held_ = false;
-  bool wait_for_release_ = false, in_hand_ = true;
+  bool wait_for_release_ = false, in_hand_ = true, second_empty_ = false;
+  std::size_t second_ = 0;  // what the second hand holds: place in kSecond
   std::string message_;
   std::chrono::steady_clock::time_point message_until_{};
 };

@@ -33,6 +33,7 @@
 #include "osteo/grid/brick_places.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
+#include "osteo/view/instrument_view.h"
 #include "osteo/view/offscreen.h"
 #include "osteo/view/scope_camera.h"
 #include "osteo/view/structures_view.h"
@@ -83,6 +84,7 @@ class RehearsalWindow {
     cuts_.release();
     structures_.reset();
     stereo_.release();
+    for (auto& hand : hands_) hand.reset();
     tools_.reset();
     world_view_.reset();
     render_window_->Finalize();
@@ -135,20 +137,7 @@ class RehearsalWindow {
 
   void make_scene() {
     set_up_scene(renderer_);
-    for (DrawnHand& hand : drawn_) {
-      for (const auto& [actor, mapper] :
-           {std::pair<vtkActor*, vtkPolyDataMapper*>{hand.head, hand.head_mapper}, {hand.shaft, hand.shaft_mapper}}) {
-        actor->SetMapper(mapper);
-        actor->SetUserMatrix(hand.matrix);
-        actor->SetVisibility(0);
-        renderer_->AddActor(actor);
-      }
-      hand.head->GetProperty()->SetSpecular(0.6);
-      hand.head->GetProperty()->SetSpecularPower(40);
-      hand.shaft->GetProperty()->SetColor(0.62, 0.66, 0.72);
-      hand.shaft->GetProperty()->SetSpecular(0.5);
-    }
-    draw_instrument(drawn_[0], control_.tool());
+    for (auto& hand : hands_) hand = std::make_unique<InstrumentView>(renderer_);
   }
 
   // A rehearsal has begun, perhaps with another bone.
@@ -162,21 +151,6 @@ class RehearsalWindow {
   }
 
   // --- the view ---------------------------------------------------------------------------------------------------
-
-  // What a hand is drawn as.
-  struct DrawnHand {
-    vtkNew<vtkActor> head, shaft;
-    vtkNew<vtkPolyDataMapper> head_mapper, shaft_mapper;
-    vtkNew<vtkMatrix4x4> matrix;
-    int tool = -1;
-  };
-  static void draw_instrument(DrawnHand& hand, int tool) {
-    if (hand.tool == tool) return;
-    hand.tool = tool;
-    const Instrument& held = instrument_of(static_cast<std::uint8_t>(tool));
-    hand.head_mapper->SetInputData(round_cone_surface(held.head));
-    hand.shaft_mapper->SetInputData(round_cone_surface(held.shaft));
-  }
 
   // World point under a window position at the depth of `reference` along the view.
   [[nodiscard]] Vec3 unproject(double x, double y, Vec3 reference) const { return scope_.view().at_depth_of(reference, scope_.area, x, y); }
@@ -254,7 +228,6 @@ class RehearsalWindow {
     panel();
     if (control_.failure()) return;
     Rehearsal& now = control_.rehearsal();
-    draw_instrument(drawn_[0], control_.tool());
     cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
     if (show_help_) draw_help(show_help_, width_);
     now.look([&](const World& world, SceneReaders& readers) {
@@ -263,13 +236,7 @@ class RehearsalWindow {
     });
     world_view_->highlight(control_.tools().piece());
     const TickRecord tick = now.latest();
-    place_tool(drawn_[0], tick);
-    for (std::size_t hand = 1; hand < now.hands(); ++hand) {
-      const TickRecord other = now.latest(hand);
-      if (other.tick == 0) continue;
-      draw_instrument(drawn_[hand], other.device.tool);
-      place_tool(drawn_[hand], other);
-    }
+    show_instruments(now);
     tools_->show(control_.tools(), tick);
     control_.wash(keyboard_.held(Command::suck), keyboard_.held(Command::wash));
     note_camera(now);
@@ -358,22 +325,19 @@ class RehearsalWindow {
       control_.say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
   }
 
-  void place_tool(DrawnHand& hand, const TickRecord& tick) {
-    const Vec3 axis = normalized(from_floats(tick.device.axis));
-    const Vec3 u = any_perpendicular(axis), v = cross(axis, u);
-    const Vec3 columns[3] = {u, v, axis};
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) hand.matrix->SetElement(r, c, columns[c][static_cast<std::size_t>(r)]);
-    }
-    for (int r = 0; r < 3; ++r) {
-      // At the bone's surface, not in it, however far the hand has sunk in.
-      const auto a = static_cast<std::size_t>(r);
-      hand.matrix->SetElement(r, 3, static_cast<double>(tick.device.position_mm[a] + tick.shown_offset_mm[a]));
-    }
-    const bool on = tick.device.pedal != 0, shown = (tick.flags & kPlateInHand) == 0;
-    hand.head->SetVisibility(shown ? 1 : 0);
-    hand.shaft->SetVisibility(shown ? 1 : 0);
-    hand.head->GetProperty()->SetColor(on ? 0.95 : 0.75, on ? 0.62 : 0.72, on ? 0.35 : 0.62);
+  void show_instruments(Rehearsal& now) {
+    now.look([&](const World& world, SceneReaders&) {
+      const auto solid = [&](Vec3 p) { return is_bone(world, p); };
+      for (std::size_t hand = 0; hand < now.hands(); ++hand) {
+        TickRecord tick = now.latest(hand);
+        if (tick.tick == 0 && hand == 0) tick.device.tool = static_cast<std::uint8_t>(control_.tool());
+        if (hand > 0 && (tick.tick == 0 || control_.second_hand_empty())) {
+          hands_[hand]->hide();
+        } else {
+          hands_[hand]->show(tick, now.rate_hz(), solid);
+        }
+      }
+    });
   }
 
   void mouse_and_keys() {
@@ -518,6 +482,7 @@ class RehearsalWindow {
     draw_status(rehearsal, tick);  // below the buttons, which its lines would move
     draw_sound(sound_);
     draw_settings(rehearsal);
+    draw_posture(rehearsal);
     ImGui::Separator();
     ImGui::Text("hand: %s", device_name_.c_str());
     ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
@@ -602,7 +567,7 @@ class RehearsalWindow {
   int width_ = 0, height_ = 0;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
-  std::array<DrawnHand, kMostHands> drawn_;
+  std::array<std::unique_ptr<InstrumentView>, kMostHands> hands_;
   std::unique_ptr<ScenePainter> painter_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<StructuresView> structures_;

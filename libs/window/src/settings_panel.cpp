@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
+
+#include "osteo/bone/posture.h"
 
 namespace osteo {
 namespace {
@@ -24,6 +27,30 @@ bool draw_field(const FieldRef& f) {
 }
 
 }  // namespace
+
+void draw_posture(Rehearsal& rehearsal) {
+  std::optional<Vec3> down;
+  rehearsal.look([&](const World&, SceneReaders& readers) {
+    if (readers.dust) down = readers.dust->dust().gravity();
+  });
+  if (!down || !ImGui::CollapsingHeader("How the patient lies")) return;
+  PostureNow now = posture_of(*down);
+  bool changed = false;
+  for (std::size_t n = 0; n < EnumNames<Posture>::values.size(); ++n) {
+    if (n % 3 != 0) ImGui::SameLine();
+    std::string name(EnumNames<Posture>::values[n]);
+    std::replace(name.begin(), name.end(), '_', ' ');
+    if (!ImGui::RadioButton(name.c_str(), now.posture == static_cast<Posture>(n))) continue;
+    now = {static_cast<Posture>(n), 0};
+    changed = true;
+  }
+  auto turned = static_cast<float>(now.head_turned_deg);
+  ImGui::PushItemWidth(90);
+  if (now.posture != Posture::sitting && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg")) changed = true;
+  ImGui::PopItemWidth();
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("where dust and water fall to; positive: the face towards the patient's left");
+  if (changed) rehearsal.act(SceneAction::posture(down_of(now.posture, static_cast<double>(turned))));
+}
 
 void draw_settings(Rehearsal& rehearsal) {
   if (!ImGui::CollapsingHeader("How it feels")) return;

@@ -6,5 +6,7 @@ namespace osteo {
 
 /// Into the current ImGui window: a header that opens, and under it all haptic settings, each an action of the session when it is changed.
 void draw_settings(Rehearsal& rehearsal);
+/// The same for how the patient lies; nothing in a scene without dust.
+void draw_posture(Rehearsal& rehearsal);
 
 }  // namespace osteo

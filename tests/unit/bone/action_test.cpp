@@ -76,6 +76,10 @@ TEST(Action, RowsSayWhatTheWorldDoes) {
       case ActionKind::undo:
         w.act(SceneAction::saw(middle));
         break;
+      case ActionKind::posture:
+        EXPECT_FALSE(w.act(a).done) << "nothing is down";
+        a = SceneAction::posture({0, 0, -1});
+        break;
       default:
         break;
     }

@@ -92,7 +92,7 @@ TEST(Operation, EverythingComesOutTheSameFromTheStream) {
       ASSERT_TRUE(s.dust);
       const Dust::Totals& d = *s.dust;
       EXPECT_NEAR(d.added_mm3, s.removed_mm3 + s.sawn_mm3, 1e-3);
-      EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.sucked_mm3 + d.washed_mm3 + d.fallen_mm3, 1e-9);
+      EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.slurry_mm3 + d.sucked_mm3 + d.fallen_mm3, 1e-9);
       EXPECT_GT(d.sucked_mm3, 0);
       EXPECT_EQ(s.bodies, 2u);
       const Session session = read_session(file);

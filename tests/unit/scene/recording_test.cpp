@@ -266,7 +266,7 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
     const Dust::Totals d = readers.dust->dust().totals();
     EXPECT_NEAR(d.added_mm3, before - operation.world().volume_mm3(), 1e-2);
     EXPECT_NEAR(d.added_mm3, operation.removed_mm3() + readers.tools.sawn_mm3(), 1e-2);
-    EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.sucked_mm3 + d.washed_mm3 + d.fallen_mm3, 1e-9);
+    EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.slurry_mm3 + d.sucked_mm3 + d.fallen_mm3, 1e-9);
   }
 }
 

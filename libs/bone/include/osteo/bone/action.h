@@ -25,11 +25,12 @@ enum class ActionKind : std::uint32_t {
   detach,     ///< take a plate off
   open,       ///< set the gap of a distractor
   suction,    ///< a sucker at a place; rate 0: away
-  irrigate,   ///< water at a place; share 0: away
+  irrigate,   ///< water at a place; rate 0: away
   undo,       ///< take back the last stroke of the burr, saw, split, move, attach, detach or open
   soft_push,  ///< what soft tissue pushes with near the tool, until the next of these
   setting,    ///< one of the haptic settings has another value
   stroke,     ///< a stroke of the burr has ended: a step that undo can take back
+  posture,    ///< the patient lies otherwise: what is down for dust and water
   behind_last
 };
 
@@ -58,7 +59,8 @@ struct SceneAction {
   static SceneAction detach(std::uint32_t fixture);
   static SceneAction open(std::uint32_t fixture, double opening_mm);
   static SceneAction suction(Vec3 nozzle_mm, double radius_mm, double mm3_per_s);
-  static SceneAction irrigate(Vec3 at_mm, double radius_mm, double share_per_s);
+  static SceneAction irrigate(Vec3 at_mm, double radius_mm, double mm3_per_s);
+  static SceneAction posture(Vec3 down);  ///< unit, LPS of the case: down_of()
   /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
   static SceneAction soft_push(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   static SceneAction setting(std::uint32_t number, double value);
@@ -90,8 +92,8 @@ struct ActionRow {
   std::span<const ActionValue> values = {};                      ///< from the first on; the rest mean nothing
 };
 
-/// Changes of densities before it and after it have to be kept apart wherever only the last of each voxel is kept: it depends on them, or it
-/// is a step of undo and so parts the burr's strokes.
+/// Changes of densities before it and after it have to be kept apart wherever only the last of each voxel is kept: it depends on them, or
+/// it is a step of undo and so parts the burr's strokes.
 [[nodiscard]] constexpr bool parts_changes(const ActionRow& row) {
   return row.reads_bone || row.changes_world;
 }

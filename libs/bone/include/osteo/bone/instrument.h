@@ -24,8 +24,8 @@ struct Instrument {
   RoundCone head;              ///< its tip's centre at the origin, handle along +z
   RoundCone shaft;             ///< behind it, in the same frame
   int burr = -1;               ///< index in burr_library(); -1: none, it removes nothing
-  double rate = 0;             ///< sucker: mm3 of dust a second; irrigator: share of the dust that it carries away in a second; pedal down
-  double reach_mm = 0;         ///< of those two, around the tip's centre
+  double rate = 0;             ///< sucker: mm3 of dry dust a second; irrigator: mm3 of water a second; pedal down
+  double reach_mm = 0;         ///< sucker: around the tip's centre; irrigator: how far its jet goes on
   double falloff_per_rad = 0;  ///< burr: share of its efficiency lost for each radian of latitude
 
   [[nodiscard]] const Burr* as_burr() const { return burr < 0 ? nullptr : &burr_library()[static_cast<std::size_t>(burr)]; }
@@ -34,7 +34,8 @@ struct Instrument {
 /// Burrs first, under their numbers in burr_library(); then suckers of 5, 7, 8, 10 and 12 French, an irrigator, a blunt probe, a hook.
 /// A tool is named by its index here, also in session files. Suckers: straight tubes as thick as the French scale says (a third of a
 /// millimetre each; sizes as the Frazier pattern is sold in), closed at the tip by a dome. What they suck is a guess: 60 mm3/s within 4 mm
-/// at 10 French, in proportion to the lumen's area and to its diameter. The hook's bent tip is felt as a ball around it.
+/// at 10 French, in proportion to the lumen's area and to its diameter. The irrigator's 24 ml a
+/// minute are a guess too. The hook's bent tip is felt as a ball around it.
 [[nodiscard]] const std::vector<Instrument>& instrument_library();
 /// Error(usage), with all names, when there is none.
 [[nodiscard]] int instrument_index(std::string_view name);

@@ -13,7 +13,7 @@ namespace osteo {
 /// Moves in tick(), a hundred steps a second, so that a replay ends with the same dust to the bit. What a stroke or a saw left stays dust
 /// when it is taken back. After ticks were lost: what is gone since has become dust, later than it was made. One that joins a scene whose
 /// pieces it does not know begins without dust.
-/// Memory: a copy of the bone as of the tick reached, and 2 KB for each brick that holds dust.
+/// Memory: a copy of the bone as of the tick reached, and 2 to 6 KB for each brick that holds dust or water.
 class DustReader final : public Reader {
  public:
   DustReader(const World& world, double rate_hz);
@@ -58,7 +58,7 @@ class DustReader final : public Reader {
   std::map<std::uint32_t, Bone> bones_;  // by id
   std::deque<Pending> pending_;
   std::unique_ptr<Dust> dust_;
-  SceneAction sucker_, water_;
+  SceneAction sucker_, water_, posture_;
   std::size_t applied_early_ = 0;  // pending when ticks were lost, whose action is still to be told
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "osteo/bone/dust.h"
 #include "osteo/haptics/renderer.h"
 #include "osteo/haptics/stream.h"
 
@@ -27,8 +28,9 @@ struct SessionHeader {
   std::string bone_hash;  ///< World::hash() before the first tick
   double rate_hz = 1000;
   Kernels kernels;
-  HapticSetup haptics;  ///< of how many hands, too: each tick has a record for each, in their order
-  bool dust = false;  ///< the scene has bone dust
+  HapticSetup haptics;          ///< of how many hands, too: each tick has a record for each, in their order
+  bool dust = false;            ///< the scene has bone dust
+  int dust_model = kDustModel;  ///< which its hash is of: a replay compares its own model's only
 };
 
 /// How it ended.
