@@ -90,24 +90,24 @@ void HeatReader::begin(const World& world) {
 void HeatReader::place_structures() {
   if (structures_ == nullptr) return;
   const bool first_time = places_.empty();
-  const auto [face, whose] = structures_->surface();
-  std::size_t number = 0;
+  std::size_t next = 0;
   std::set<std::array<int, 5>> known;
-  for (std::size_t p = 0; p < face.points_mm.size(); ++p) {
-    const auto& q = face.points_mm[p];
-    const Vec3 at{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
-    for (const auto& b : bodies_) {
-      const Vec3 v = b->bone.frame().index_from_world(at);
-      const Ijk voxel{static_cast<int>(std::floor(v.x + 0.5)), static_cast<int>(std::floor(v.y + 0.5)),
-                      static_cast<int>(std::floor(v.z + 0.5))};
-      if (b->of_region && b->bone.find(voxel.i, voxel.j, voxel.k) == BrickGrid::kNone) continue;
-      const Ijk c = b->cell_of(voxel);
-      if (known.insert({static_cast<int>(b->id), c.i, c.j, c.k, whose[p]}).second) {
-        if (first_time) places_.push_back({whose[p], {params_.body_c, 0, false}, params_.body_c});
-        if (number < places_.size())
-          b->places[{c.i >> 3, c.j >> 3, c.k >> 3}].emplace_back((c.i & 7) | (c.j & 7) << 3 | (c.k & 7) << 6, number++);
+  for (std::size_t n = 0; n < structures_->values().size(); ++n) {
+    const std::uint8_t structure = structures_->values()[n];
+    for (const auto& q : structures_->face(n).points_mm) {
+      const Vec3 at{static_cast<double>(q[0]), static_cast<double>(q[1]), static_cast<double>(q[2])};
+      for (const auto& b : bodies_) {
+        const Vec3 v = b->bone.frame().index_from_world(at);
+        const auto whole = [](double x) { return static_cast<int>(std::floor(x + 0.5)); };
+        const Ijk voxel{whole(v.x), whole(v.y), whole(v.z)};
+        if (b->of_region && b->bone.find(voxel.i, voxel.j, voxel.k) == BrickGrid::kNone) continue;
+        const Ijk c = b->cell_of(voxel);
+        if (!known.insert({static_cast<int>(b->id), c.i, c.j, c.k, structure}).second) break;
+        if (first_time) places_.push_back({structure, {params_.body_c, 0, false}, params_.body_c});
+        if (next < places_.size())
+          b->places[{c.i >> 3, c.j >> 3, c.k >> 3}].emplace_back((c.i & 7) | (c.j & 7) << 3 | (c.k & 7) << 6, next++);
+        break;
       }
-      break;
     }
   }
 }
