@@ -27,6 +27,7 @@ cli::Program make_osteo_program() {
   p.add<ReplayCommand>();
   p.add<ExportCommand>();
   p.add<SoundCommand>();
+  p.add<StudyCommand>();
   p.add<DevicesCommand>();
   p.add<DoctorCommand>();
   p.add<DemoCommand>();
