@@ -40,7 +40,8 @@ study.sessions.forEach((s, n) => {
   box.id = s;
   make("h2", (n + 1) + ". Session " + s, box);
   const movie = make("video", "", box);
-  movie.controls = true; movie.preload = "none"; movie.src = "../movies/" + s + ".mp4";
+  movie.controls = true; movie.preload = "metadata"; movie.src = "../movies/" + s + ".mp4";
+  movie.addEventListener("error", () => { const p = make("p", "No movie: movies/" + s + ".mp4 is missing or cannot be played."); p.className = "quiet"; movie.replaceWith(p); });
   study.items.forEach((item, k) => {
     const field = make("fieldset", "", box);
     make("legend", item, field);
