@@ -250,7 +250,7 @@ class Analyst {
       // Of the same two groups once, unless this outcome has others than the rest.
       const std::string why = first + " has " + counted(a.size(), "person", "people") + ", " + second + " " + std::to_string(b.size()) +
                               "; " + std::to_string(kPeopleToCompare) + " in each are needed.";
-      if (said.insert(why).second) refuse("Comparison of " + first + " and " + second + " (" + o.name + ")", why);
+      if (said.insert(why).second) refuse("Comparison of " + first + " and " + second + ", wherever so few have a value", why);
       return;
     }
     const Welch w = welch(a, b, settings_.level);
@@ -325,11 +325,13 @@ class Analyst {
 
   void repeated_table() {
     sheet::Table table{{"outcome", "groups", "sessions", "difference", "df", "p", "share between people"}, {}, {}};
+    bool at_edge = false;
     for (const Json& row : json_.find("comparisons")->items()) {
       const Json& m = *row.find("mixed_model");
       if (m.is_null()) continue;
       const auto value = [&](const char* key) { return m.find(key)->number().value_or(kUndefined); };
       const auto& ends = m.find("interval")->items();
+      at_edge = at_edge || value("variance_between_people") == 0;
       Estimate e{value("difference"), {}};
       if (ends.size() == 2) e.interval = {*ends[0].number(), *ends[1].number()};
       table.rows.push_back({{*row.find("outcome")->text()},
@@ -344,6 +346,10 @@ class Analyst {
     say("People came several times. The same differences from single sessions, by a mixed model with a random intercept for each person "
         "(REML, Satterthwaite's degrees of freedom):");
     add(std::move(table));
+    if (at_edge)
+      say("Where the share between people is 0, the model takes sessions for people, and its p may be too small: go by the table of "
+          "people.",
+          Tone::caution);
   }
 
   void correlate() {
@@ -423,7 +429,7 @@ class Analyst {
           study_.plan.competent + " has " + counted(able.size(), "person", "people") + ", others " + std::to_string(others.size());
       if (able.size() < kPeopleToCompare || others.size() < kPeopleToCompare) {
         if (said.insert(sizes).second)
-          refuse("ROC and pass mark (" + o.name + ")", sizes + "; " + std::to_string(kPeopleToCompare) + " each are needed.");
+          refuse("ROC and pass marks, wherever so few have a value", sizes + "; " + std::to_string(kPeopleToCompare) + " each are needed.");
         continue;
       }
       const Roc r = roc(able, others, settings_.level);
@@ -440,7 +446,7 @@ class Analyst {
           {o.name}, {std::to_string(able.size()) + ", " + std::to_string(others.size())}, {with(r.area)}, {"-"}, {"-"}, {"-"}};
       if (able.size() < kPeopleForAMark || others.size() < kPeopleForAMark) {
         if (said.insert("mark" + sizes).second)
-          refuse("Pass mark (" + o.name + ")", sizes + "; " + std::to_string(kPeopleForAMark) + " each are needed.");
+          refuse("Pass marks, wherever so few have a value", sizes + "; " + std::to_string(kPeopleForAMark) + " each are needed.");
       } else {
         const PassMark m = contrasting_groups(able, others, resampling_);
         if (std::isnan(m.mark.value)) {

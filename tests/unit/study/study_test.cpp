@@ -336,7 +336,7 @@ TEST(Analyse, ThreeInAGroupAreToldWhatTheyCannotShow) {
   const Analysis a = analyse(example(3, 2), {0.95, 200});
   EXPECT_EQ(number(a.json.find("comparisons")->items()[0], {"permutation_smallest_p"}), 0.1);
   EXPECT_NE(sheet_html(a.sheet).find("so few people that no result whatever"), std::string::npos);
-  EXPECT_TRUE(refused(a, "Pass mark", "5 each are needed"));
+  EXPECT_TRUE(refused(a, "Pass marks", "5 each are needed"));
 }
 
 TEST(Analyse, ThreeGroupsAndSeveralItems) {
