@@ -4,6 +4,7 @@ _osteo() {
   if [ "$COMP_CWORD" -eq 1 ]; then
     COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound heat devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound experiment devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound study devices doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -93,6 +94,7 @@ _osteo() {
     heat) flags="$flags --cutting-share --diamond-w-per-n --water-c --film --cell-mm --case-folder" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --stereo --stereo-base --experiment --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s" ;;
+    study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level" ;;
     devices) flags="$flags --watch --recording" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;

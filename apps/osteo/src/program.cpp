@@ -30,6 +30,7 @@ cli::Program make_osteo_program() {
   p.add<SoundCommand>();
   p.add<HeatCommand>();
   p.add<ExperimentCommand>();
+  p.add<StudyCommand>();
   p.add<DevicesCommand>();
   p.add<MarkersCommand>();
   p.add<CalibrateCameraCommand>();

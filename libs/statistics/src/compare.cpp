@@ -127,14 +127,19 @@ Estimate cliffs_delta(std::span<const double> a, std::span<const double> b, doub
   const double na = static_cast<double>(a.size()), nb = static_cast<double>(b.size());
   std::vector<double> of_a(a.size()), of_b(b.size());
   const auto sign = [](double x, double y) { return x > y ? 1.0 : x < y ? -1.0 : 0.0; };
+  // Counted whole and divided once: no overlap is then exactly 1.
+  double all = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
-      of_a[i] += sign(a[i], b[j]) / nb;
-      of_b[j] += sign(a[i], b[j]) / na;
+      of_a[i] += sign(a[i], b[j]);
+      of_b[j] += sign(a[i], b[j]);
+      all += sign(a[i], b[j]);
     }
   }
+  for (double& d : of_a) d /= nb;
+  for (double& d : of_b) d /= na;
   Estimate e;
-  const double delta = e.value = mean(of_a), z = normal_quantile(0.5 + level / 2);
+  const double delta = e.value = all / (na * nb), z = normal_quantile(0.5 + level / 2);
   if (a.size() < 2 || b.size() < 2) return e;
   double rows = 0, columns = 0, cells = 0;
   for (const double d : of_a) rows += (d - delta) * (d - delta);

@@ -16,14 +16,19 @@ Roc roc(std::span<const double> positive, std::span<const double> negative, doub
   if (positive.empty() || negative.empty()) return r;
   const double m = static_cast<double>(positive.size()), n = static_cast<double>(negative.size());
   std::vector<double> of_positive(positive.size()), of_negative(negative.size());
+  // Counted in halves and divided once: no overlap is then exactly 1.
+  double all = 0;
   for (std::size_t i = 0; i < positive.size(); ++i) {
     for (std::size_t j = 0; j < negative.size(); ++j) {
       const double won = positive[i] > negative[j] ? 1 : positive[i] == negative[j] ? 0.5 : 0;
-      of_positive[i] += won / n;
-      of_negative[j] += won / m;
+      of_positive[i] += won;
+      of_negative[j] += won;
+      all += won;
     }
   }
-  r.area.value = mean(of_positive);
+  for (double& v : of_positive) v /= n;
+  for (double& v : of_negative) v /= m;
+  r.area.value = all / (m * n);
   if (positive.size() > 1 && negative.size() > 1) {
     const double z = normal_quantile(0.5 + level / 2);
     r.standard_error = std::sqrt(variance(of_positive) / m + variance(of_negative) / n);

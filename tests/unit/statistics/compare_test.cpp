@@ -102,6 +102,24 @@ TEST(Compare, GroupsThatDoNotOverlap) {
   EXPECT_GT(hedges_g(high, low).interval.lo, 0);
 }
 
+TEST(Compare, NoOverlapIsExactlyOneForAnySizes) {
+  for (int m = 2; m <= 12; ++m) {
+    for (int n = 2; n <= 12; ++n) {
+      std::vector<double> high, low;
+      for (int i = 0; i < m; ++i) high.push_back(100 + 0.1 * i);
+      for (int i = 0; i < n; ++i) low.push_back(0.1 * i);
+      const Estimate d = cliffs_delta(high, low), turned = cliffs_delta(low, high);
+      EXPECT_EQ(d.value, 1);
+      EXPECT_LT(d.interval.lo, 0.7);
+      EXPECT_EQ(turned.value, -1);
+      EXPECT_GT(turned.interval.hi, -0.7);
+      EXPECT_EQ(roc(high, low).area.value, 1);
+      EXPECT_LT(roc(high, low).area.interval.lo, 0.85);
+      EXPECT_EQ(roc(low, high).area.value, 0);
+    }
+  }
+}
+
 TEST(Compare, TooLittle) {
   const std::vector<double> one{1}, two{1, 2}, same{3, 3, 3};
   EXPECT_TRUE(std::isnan(welch(one, two).p));

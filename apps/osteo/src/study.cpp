@@ -1,0 +1,176 @@
+// study: people, sessions, ratings and what they show, in a folder of plain files.
+#include <map>
+#include <ostream>
+#include <set>
+
+#include "commands.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/base/json_document.h"
+#include "osteo/base/param.h"
+#include "osteo/report/sheet.h"
+#include "osteo/study/analysis.h"
+#include "osteo/study/study.h"
+
+namespace osteo {
+namespace {
+
+std::vector<std::string> names_in(const std::string& text) {
+  std::vector<std::string> names;
+  std::string name;
+  for (const char c : text + ",") {
+    if (c != ',') {
+      name += c;
+      continue;
+    }
+    const auto from = name.find_first_not_of(' '), to = name.find_last_not_of(' ');
+    if (from != std::string::npos) names.push_back(name.substr(from, to - from + 1));
+    name.clear();
+  }
+  return names;
+}
+
+// What an action takes beside --seed, --force and the like; anything else on the command line would do nothing.
+const std::map<std::string, std::set<std::string>>& flags_of_actions() {
+  static const std::map<std::string, std::set<std::string>> flags{
+      {"new", {"title", "procedure", "groups", "competent", "cases", "items", "attempts", "lowest", "highest"}},
+      {"add", {"participant", "group", "case_name", "attempt"}},
+      {"order", {}},
+      {"form", {"rater"}},
+      {"rate", {}},
+      {"analyse", {"out", "resamples", "level"}},
+  };
+  return flags;
+}
+
+void need_known(const cli::Invocation& io, const std::string& action) {
+  std::vector<std::string> actions;
+  std::set<std::string> any;
+  for (const auto& [name, flags] : flags_of_actions()) {
+    actions.push_back(name);
+    any.insert(flags.begin(), flags.end());
+  }
+  if (!flags_of_actions().contains(action)) {
+    const std::string near = nearest_name(action, actions);
+    throw Error(ExitCode::usage, "'" + action + "' is nothing that a study can do: new, add, order, form, rate or analyse",
+                near.empty() ? "" : "did you mean '" + near + "'?");
+  }
+  for (const std::string& flag : io.given) {
+    if (!any.contains(flag) || flags_of_actions().at(action).contains(flag)) continue;
+    std::string written = flag;
+    for (char& c : written) c = c == '_' ? '-' : c;
+    throw Error(ExitCode::usage, "--" + written + " does nothing with 'study " + action + "'");
+  }
+  const bool takes_file = action == "add" || action == "rate";
+  if (io.arguments.size() > 2 && !takes_file)
+    throw Error(ExitCode::usage, "'study " + action + "' takes no file: '" + io.arguments[2] + "'");
+  if (io.arguments.size() < 3 && action == "rate")
+    throw Error(ExitCode::usage, "'study rate' needs the file that the form saved", "osteo study rate STUDY R1.json");
+}
+
+void write_new(const fs::path& path, const std::string& content, bool force) {
+  if (output_exists(path) && !force) throw Error(ExitCode::cannot_write, "'" + path.string() + "' is there already", "--force replaces it");
+  write_file(path, content);
+}
+
+}  // namespace
+
+cli::CommandInfo StudyCommand::info() {
+  return {
+      "study",
+      "a study: people by code, order of cases, sessions, ratings, analysis",
+      "Keeps a study as a folder of plain files. 'new' makes it; 'add' takes a participant (--group), or with a file (JSON or a CSV row) "
+      "the metrics of a session; 'order' draws who does which case when; 'form' writes a page to rate sessions with, in any browser and "
+      "without a network; 'rate' takes what it saved; 'analyse' writes what the study shows: agreement of raters, differences of groups "
+      "with effect sizes and intervals, correlation of metrics with ratings, ROC, pass marks and power, as JSON, HTML and PDF. What "
+      "there is too little for is not computed, and the report says why. Random choices follow the study's own seed, given to 'new'. "
+      "docs/study.md defines every number and says what may not be concluded.",
+      {{"action", "new, add, order, form, rate or analyse"},
+       {"study", "its folder"},
+       {"file", "add: metrics of a session (.json, .csv); rate: ratings that the form saved", true}},
+      "osteo study analyse STUDY"};
+}
+
+int StudyCommand::run(const Params& p, cli::Invocation& io) {
+  const std::string action = io.arguments[0];
+  need_known(io, action);
+  const fs::path folder = io.arguments[1];
+  if (io.given.contains("seed") && action != "new")
+    throw Error(ExitCode::usage, "--seed does nothing here: the study has its own", "it is in " + (folder / "study.json").string());
+  std::vector<std::string> notes;
+  Json done{{"action", action}};
+  std::string said;
+  if (action == "new") {
+    study::Plan plan;
+    plan.title = p.title;
+    plan.procedure = p.procedure;
+    plan.groups = names_in(p.groups);
+    plan.cases = names_in(p.cases);
+    plan.items = names_in(p.items);
+    plan.competent = !p.competent.empty() || plan.groups.empty() ? p.competent : plan.groups.back();
+    plan.attempts = p.attempts;
+    plan.lowest = p.lowest;
+    plan.highest = p.highest;
+    plan.seed = static_cast<std::uint64_t>(io.common.seed);
+    study::new_study(folder, plan);
+    said = "made '" + folder.string() + "'; meant to pass: " + plan.competent + " (--competent says otherwise)";
+  } else if (action == "add" && io.arguments.size() < 3) {
+    for (const char* const flag : {"case_name", "attempt"}) {
+      if (io.given.contains(flag))
+        throw Error(ExitCode::usage, "a session needs the file of its metrics", "osteo study add STUDY metrics.json ...");
+    }
+    const std::string code = study::add_participant(folder, p.participant, p.group);
+    done["participant"] = code;
+    said = code + " is in " + p.group;
+  } else if (action == "add") {
+    if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
+    const std::string blind = study::add_session(folder, p.participant, p.case_name, p.attempt, io.arguments[2], notes);
+    done["blind"] = blind;
+    said = "raters know the session as " + blind + ": its movie goes to " + (folder / "movies" / (blind + ".mp4")).string();
+  } else if (action == "order") {
+    const std::size_t added = study::make_order(folder);
+    done["added"] = added;
+    said = "order.csv: " + std::to_string(added) + " people added";
+  } else if (action == "form") {
+    const fs::path file = folder / "forms" / (p.rater + ".html");
+    const std::string page = study::form_html(study::read_study(folder), p.rater);
+    make_output_folder(folder / "forms");
+    write_new(file, page, io.common.force);
+    done["form"] = file.string();
+    said = "open " + file.string() + " in a browser";
+  } else if (action == "rate") {
+    const study::RaterSheet sheet = study::read_ratings(read_text(io.arguments[2]), io.arguments[2], study::read_study(folder), notes);
+    make_output_folder(folder / "ratings");
+    write_new(folder / "ratings" / (sheet.rater + ".json"), read_text(io.arguments[2]), io.common.force);
+    done["rater"] = sheet.rater;
+    said = sheet.rater + ": ratings of " + std::to_string(sheet.sessions.size()) + " sessions taken";
+  } else {
+    const study::Study study = study::read_study(folder);
+    const study::Analysis analysis = study::analyse(study, {p.level, p.resamples});
+    const std::string base = p.out.empty() ? (folder / "report").string() : p.out;
+    // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put elsewhere.
+    const bool replace = p.out.empty() || io.common.force;
+    for (const char* const suffix : {".json", ".html", ".pdf"}) {
+      if (!replace && output_exists(base + suffix))
+        throw Error(ExitCode::cannot_write, "'" + base + suffix + "' is there already", "--force replaces it");
+    }
+    write_file(base + ".json", analysis.json.dump(2) + "\n");
+    write_file(base + ".html", sheet_html(analysis.sheet));
+    write_file(base + ".pdf", sheet_pdf(analysis.sheet));
+    for (const Json& r : analysis.json.find("refused")->items())
+      notes.push_back("not computed: " + *r.find("what")->text() + ". " + *r.find("why")->text());
+    done = analysis.json;
+    said = base + ".html, .pdf and .json";
+  }
+  if (io.common.json) {
+    if (!notes.empty() && action != "analyse") done["notes"] = Json(notes);
+    io.out << done.dump(2) << '\n';
+  }
+  if (!io.common.quiet) {
+    for (const std::string& note : notes) io.err << note << '\n';
+    if (!io.common.json) io.err << said << '\n';
+  }
+  return 0;
+}
+
+}  // namespace osteo
