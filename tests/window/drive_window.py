@@ -182,6 +182,16 @@ def keys():
         for name in ("F1", "h"):
             key(name, "help", lambda s: s["help"])
             key(name, "help away", lambda s: not s["help"])
+        # The picture: as asked for; at rest in full size, and then not drawn again until something changes.
+        for level in ("plain", "calm", "deep", "auto"):
+            key("j", f"quality {level}", lambda s: s["quality"] == level and level in (s["level"], "auto"))
+        rested = w.until("the picture rests", lambda s: s["at_rest"] and s["scale"] == 1)
+        for _ in range(3):
+            w.next(5)
+        assert w.state()["drawn"] <= rested["drawn"] + 2, (rested, w.state())
+        w.drag(3, 30, 10)
+        assert w.state()["drawn"] > rested["drawn"] + 1, (rested, w.state())
+        key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
         key("m", "mark", lambda s: s["message"] == "marked")
         key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.

@@ -124,7 +124,7 @@ void set_depth(vtkRenderer* renderer, const PictureStyle& style) {
   if (!style.effects) return;
   const double radius_mm = std::clamp(0.035 * seen_height_mm(renderer), 0.5, 8.0);
   renderer->SetSSAORadius(radius_mm);
-  renderer->SetSSAOBias(0.03 * radius_mm);
+  renderer->SetSSAOBias(0.06 * radius_mm);
   renderer->SetSSAOKernelSize(32);
   renderer->SetSSAOBlur(true);
 }

@@ -13,7 +13,9 @@ constexpr double kTilt = 0.87, kMiddle = 0.32;  // radians
 // Where a cone is looked at, in cells of each level: just clear of the flat face it stands on.
 constexpr double kAhead = 1.5, kAside = 2.1;
 // What lies between the places looked at blocks too: fitted to round holes of 3 to 8 mm.
-constexpr double kBlocked = 1.7;
+constexpr double kBlocked = 2;
+// Ripples that the slices leave on flat bone are no cavities.
+constexpr double kSlack = 1.04;
 
 }  // namespace
 
@@ -135,7 +137,7 @@ double Openness::at(const std::array<float, 3>& index, const std::array<float, 3
     }
     open += free * (w == 0 ? kMiddle : (1 - kMiddle) / 4);
   }
-  return std::pow(open, kBlocked);
+  return std::pow(std::min(1.0, kSlack * open), kBlocked);
 }
 
 }  // namespace osteo

@@ -94,7 +94,11 @@ TEST(Picture, ACavityLooksDeep) {
 
 TEST(Picture, NothingBurnsOutAndNoShadowIsBlack) {
   const auto bone = test::solid(
-      0.5, 14, [](Vec3 p) { return (length(p) < 11 && !(length(p - Vec3{0, -9, 0}) < 6)) || (length(p - Vec3{11, 0, 4}) < 3); }, {}, 2);
+      0.5, 14,
+      [](Vec3 p) {
+        return (length(p) < 11 && !(length(p - Vec3{0, -9, 0}) < 6)) || (length(p - Vec3{11, 0, 4}) < 3);
+      },
+      {}, 2);
   LiveSurface surface(bone, {});
   surface.shade({});
   Scene scene;
@@ -203,7 +207,8 @@ TEST(Picture, RefreshedIsAsShownAnew) {
 }
 
 TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
-  const auto bone = test::solid(0.5, 8, [](Vec3 p) { return length(p) < 6; }, {}, 2);
+  const auto bone = test::solid(
+      0.5, 8, [](Vec3 p) { return length(p) < 6; }, {}, 2);
   LiveSurface surface(bone, {});
   Scene scene;
   BoneView view(scene.renderer);
@@ -271,7 +276,8 @@ TEST(Colours, ShineThroughThinBoneWithoutSteps) {
 
 // The speckle of cut cancellous bone belongs to the place.
 TEST(Colours, SpeckleStaysWhereItIs) {
-  const auto bone = test::solid(0.4, 10, [](Vec3 p) { return p.z < 2; }, {}, 1);
+  const auto bone = test::solid(
+      0.4, 10, [](Vec3 p) { return p.z < 2; }, {}, 1);
   // 300 HU everywhere.
   SparseGrid hu = to_sparse(bone, "hu");
   BrickGrid values = to_bricks(hu, true);
