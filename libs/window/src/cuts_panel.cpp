@@ -201,21 +201,19 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
           ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan." : "");
     }
   }
-  ImGui::SameLine();
-  ImGui::TextDisabled("%.0f / %.0f", control_.hu.width, control_.hu.level);
   bool follows = control_.follows();
-  if (ImGui::Checkbox("follow the drill", &follows)) control_.follow(follows);
+  if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
   ImGui::SameLine();
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button("along it (G)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
-  ImGui::Checkbox("removed bone", &shown_.tint_removed);
+  if (small_button("along the drill (G)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  ImGui::Checkbox("removed", &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
   if (rehearsal.structures() != nullptr) {
     ImGui::SameLine();
     const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
     if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
   }
-  ImGui::TextDisabled("%s", control_.enlarged() >= 0 ? "double click or W: back" : "double click or W: one in the middle");
+  ImGui::TextDisabled("%.0f / %.0f HU   W: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
   ImGui::End();
 }
 
