@@ -243,7 +243,8 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   const auto n = static_cast<std::size_t>(cut);
   const Box box = boxes_[n];
   if (box.width < 8 || box.height < 8) return;
-  const float scale = scale_now();
+  // Letters and lines grow with the cuts, also where the panels' text does not.
+  const float scale = std::max(scale_now(), column_.width / 360);
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
@@ -293,7 +294,7 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   on.cross(control_.cross_mm());
   on.letters();
   on.scale_bar();
-  shadowed_text(draw, {lo.x + 8 * scale, lo.y + 6 * scale}, control_.name(cut));
+  on.title(control_.name(cut));
   if (const auto& r = control_.ruler()) on.ruler({r->from_mm, r->to_mm});
   draw->PopClipRect();
   ImGui::End();
