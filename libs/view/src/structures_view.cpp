@@ -147,7 +147,7 @@ void StructuresView::show(std::size_t number, StructureLook look) {
   one.actor->GetShaderProperty()->ClearAllFragmentShaderReplacements();
   if (look != StructureLook::clear) return;
   // Any two of them leave a quarter of the pixels to what lies behind both.
-  static constexpr const char* kPatterns[] = {"x + y", "y", "x", "x / 2 + y"};
+  static constexpr const char* kPatterns[] = {"x + y", "x / 2 + y", "x + y / 2", "x / 2 + y / 2"};
   const std::string discard = "//VTK::Light::Impl\n  { int x = int(gl_FragCoord.x), y = int(gl_FragCoord.y); if (((" +
                               std::string(kPatterns[number % 4]) + ") & 1) != 0) discard; }\n";
   one.actor->GetShaderProperty()->AddFragmentShaderReplacement("//VTK::Light::Impl", true, discard, false);

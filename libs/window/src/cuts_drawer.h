@@ -50,7 +50,7 @@ class CutsDrawer {
   /// something else, nothing is being drawn, and drawing has not just taken more than a third of a processor.
   [[nodiscard]] std::vector<DrawnCut> next(const std::array<std::optional<SliceView>, 3>& views, const CutsScene& scene);
   [[nodiscard]] bool busy() const { return drawing_.valid(); }
-  /// Of the drawing that ended last, for all cuts in it; 0: none yet.
+  /// Of a processor, for all cuts of the drawing that ended last; 0: none yet.
   [[nodiscard]] double last_ms() const { return last_ms_; }
 
  private:

@@ -201,21 +201,19 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
           ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan." : "");
     }
   }
-  ImGui::SameLine();
-  ImGui::TextDisabled("%.0f / %.0f", control_.hu.width, control_.hu.level);
   bool follows = control_.follows();
-  if (ImGui::Checkbox("follow the drill", &follows)) control_.follow(follows);
+  if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
   ImGui::SameLine();
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button("along it (G)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
-  ImGui::Checkbox("removed bone", &shown_.tint_removed);
+  if (small_button("along the drill (G)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  ImGui::Checkbox("removed", &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
   if (rehearsal.structures() != nullptr) {
     ImGui::SameLine();
     const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
     if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
   }
-  ImGui::TextDisabled("%s", control_.enlarged() >= 0 ? "double click or W: back" : "double click or W: one in the middle");
+  ImGui::TextDisabled("%.0f / %.0f HU   W: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
   ImGui::End();
 }
 
@@ -245,7 +243,8 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   const auto n = static_cast<std::size_t>(cut);
   const Box box = boxes_[n];
   if (box.width < 8 || box.height < 8) return;
-  const float scale = scale_now();
+  // Letters and lines grow with the cuts, also where the panels' text does not.
+  const float scale = std::max(scale_now(), column_.width / 360);
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
@@ -295,7 +294,7 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   on.cross(control_.cross_mm());
   on.letters();
   on.scale_bar();
-  shadowed_text(draw, {lo.x + 8 * scale, lo.y + 6 * scale}, control_.name(cut));
+  on.title(control_.name(cut));
   if (const auto& r = control_.ruler()) on.ruler({r->from_mm, r->to_mm});
   draw->PopClipRect();
   ImGui::End();

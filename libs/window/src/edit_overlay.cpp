@@ -12,8 +12,7 @@ void annotate_slice(ImDrawList* draw, const EditControl& control, int v, ImVec2 
   if (control.show_cross) on.cross(control.cross_mm());
   static constexpr const char* names[] = {"Axial", "Coronal", "Sagittal"};
   const auto [slice, slices] = control.slice(v);
-  shadowed_text(draw, {lo.x + 8 * scale, lo.y + 6 * scale},
-                std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
+  on.title(std::string(names[v]) + "  " + std::to_string(slice) + " / " + std::to_string(slices));
   on.letters();
   on.scale_bar();
   if (control.ruler_mm) on.ruler(*control.ruler_mm);

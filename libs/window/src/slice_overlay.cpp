@@ -1,5 +1,6 @@
 #include "slice_overlay.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -9,11 +10,24 @@ namespace {
 
 constexpr ImU32 kText = IM_COL32(235, 235, 235, 255), kShadow = IM_COL32(0, 0, 0, 200);
 
+float width_of(const std::string& words, float size) {
+  return ImGui::GetFont()->CalcTextSizeA(size, 1e9F, 0, words.c_str()).x;
+}
+
 }  // namespace
 
-void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink) {
-  draw->AddText({at.x + 1, at.y + 1}, kShadow, words.c_str());
-  draw->AddText(at, ink, words.c_str());
+void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink, float size) {
+  if (size <= 0) size = ImGui::GetFontSize();
+  draw->AddText(ImGui::GetFont(), size, {at.x + 1, at.y + 1}, kShadow, words.c_str());
+  draw->AddText(ImGui::GetFont(), size, at, ink, words.c_str());
+}
+
+float SliceOnScreen::text_size() const {
+  return std::max(ImGui::GetFontSize(), 13 * scale);
+}
+
+void SliceOnScreen::title(const std::string& words) const {
+  shadowed_text(draw, {lo.x + 8 * scale, lo.y + 6 * scale}, words, kText, text_size());
 }
 
 ImVec2 SliceOnScreen::place(Vec3 mm) const {
@@ -36,12 +50,12 @@ void SliceOnScreen::letters() const {
   const float edge = 6 * scale;
   const ImU32 ink = IM_COL32(255, 225, 140, 255);
   const auto words = edge_letters(view);
-  const auto size = [](const std::string& s) { return ImGui::CalcTextSize(s.c_str()); };
-  const float line = ImGui::GetFontSize();
-  shadowed_text(draw, {lo.x + edge, lo.y + h / 2 - line / 2}, words[0], ink);
-  shadowed_text(draw, {lo.x + w - edge - size(words[1]).x, lo.y + h / 2 - line / 2}, words[1], ink);
-  shadowed_text(draw, {lo.x + (w - size(words[2]).x) / 2, lo.y + edge}, words[2], ink);
-  shadowed_text(draw, {lo.x + (w - size(words[3]).x) / 2, lo.y + h - line - edge}, words[3], ink);
+  const float line = text_size();
+  const auto size = [&](const std::string& s) { return width_of(s, line); };
+  shadowed_text(draw, {lo.x + edge, lo.y + h / 2 - line / 2}, words[0], ink, line);
+  shadowed_text(draw, {lo.x + w - edge - size(words[1]), lo.y + h / 2 - line / 2}, words[1], ink, line);
+  shadowed_text(draw, {lo.x + (w - size(words[2])) / 2, lo.y + edge}, words[2], ink, line);
+  shadowed_text(draw, {lo.x + (w - size(words[3])) / 2, lo.y + h - line - edge}, words[3], ink, line);
 }
 
 void SliceOnScreen::scale_bar() const {
@@ -57,7 +71,8 @@ void SliceOnScreen::scale_bar() const {
   draw->AddLine({end.x, end.y - 5 * scale}, {end.x, end.y + 1}, kText, 2 * scale);
   char words[48];
   std::snprintf(words, sizeof words, "%.0f mm", mm);
-  shadowed_text(draw, {end.x - std::max(bar, ImGui::CalcTextSize(words).x), end.y - ImGui::GetFontSize() - 6 * scale}, words);
+  const float line = text_size();
+  shadowed_text(draw, {end.x - std::max(bar, width_of(words, line)), end.y - line - 6 * scale}, words, kText, line);
 }
 
 void SliceOnScreen::ruler(const std::array<Vec3, 2>& r) const {
@@ -70,7 +85,7 @@ void SliceOnScreen::ruler(const std::array<Vec3, 2>& r) const {
   draw->AddCircleFilled(b, 3 * scale, colour);
   char words[48];
   std::snprintf(words, sizeof words, "%.1f mm", length(r[1] - r[0]));
-  shadowed_text(draw, {b.x + 8 * scale, b.y - ImGui::GetFontSize()}, words, IM_COL32(255, 150, 150, 255));
+  shadowed_text(draw, {b.x + 8 * scale, b.y - text_size()}, words, IM_COL32(255, 150, 150, 255), text_size());
 }
 
 void SliceOnScreen::line(const CutLine& l, ImU32 colour, float pixels) const {

@@ -12,8 +12,8 @@ namespace osteo {
 
 inline constexpr ImU32 kCrossColour = IM_COL32(120, 200, 120, 170);
 
-/// Light, with a dark edge, so that it can be read on bone.
-void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = IM_COL32(235, 235, 235, 255));
+/// Light, with a dark edge, so that it can be read on bone. `size`: height of a line, pixels; 0: the font's.
+void shadowed_text(ImDrawList* draw, ImVec2 at, const std::string& words, ImU32 ink = IM_COL32(235, 235, 235, 255), float size = 0);
 
 /// A slice on the screen: `lo` its upper left corner in the window, `scale` of lines and distances, as of the text.
 struct SliceOnScreen {
@@ -22,6 +22,11 @@ struct SliceOnScreen {
   ImVec2 lo;
   float scale;
   [[nodiscard]] ImVec2 place(Vec3 mm) const;
+  /// The font's height, or 13 pixels at a scale of 1 where that is more.
+  [[nodiscard]] float text_size() const;
+
+  /// At the upper left.
+  void title(const std::string& words) const;
 
   void cross(Vec3 cross_mm) const;
   /// At the four edges.
