@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <new>
 
-#include "osteo/grid/brick_places.h"
 #include "osteo/base/error.h"
+#include "osteo/grid/brick_places.h"
 
 namespace osteo {
 
@@ -106,8 +106,8 @@ HandPose RehearsalControl::hand_pose() const {
 }
 
 FreeWays RehearsalControl::free_ways(bool whole_tool) const {
-  ToolSkin skin =
-      plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip()) : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
+  ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
+                                  : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
   std::optional<FreeWays> ways;
   rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
