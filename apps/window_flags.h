@@ -67,8 +67,11 @@ struct WindowFlags {
     visit({"shape", "of the burr at the start"}, p.shape);
     visit({"contact", "how the burr feels bone: rays, volume, overlap or proxy; docs/haptics.md compares them"}, p.contact);
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
-    visit({"device", "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a pen before a camera, of pose "
-           "only (docs/marker.md)"}, p.device);
+    visit({"device",
+           "in the window, what moves the drill; auto takes the best that is plugged in ('osteo devices'); marker is a pen before a "
+           "camera, of pose "
+           "only (docs/marker.md)"},
+          p.device);
     visit({"arm", "in the window, geometry and motors of a WoodenHaptics arm, as JSON (empty: Polhem v3)"}, p.arm);
     visit({"camera", "of the marker: its lens, made by calibrate-camera"}, p.camera);
     visit({"pen", "of the marker: made by calibrate-pen (empty: pen 1, its tip 100 mm below the middle of the prism)"}, p.pen);

@@ -5,6 +5,7 @@ _osteo() {
     COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound heat devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound experiment devices doctor demo bench docs help --version" -- "$cur"))
     COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound study devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound devices markers calibrate-camera calibrate-pen track-pen doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -35,12 +36,14 @@ _osteo() {
     "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
     "rehearse --shape") COMPREPLY=($(compgen -W "ball cylinder taper " -- "$cur")); return ;;
     "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
-    "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics " -- "$cur")); return ;;
+    "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics marker " -- "$cur")); return ;;
+    "rehearse --camera-place") COMPREPLY=($(compgen -W "facing above behind " -- "$cur")); return ;;
     "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --position") COMPREPLY=($(compgen -W "supine prone sitting left_side right_side " -- "$cur")); return ;;
     "rehearse --quality") COMPREPLY=($(compgen -W "auto plain calm deep " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
+    "markers --paper") COMPREPLY=($(compgen -W "a4 letter " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
   case "${COMP_WORDS[1]}" in
@@ -90,6 +93,7 @@ _osteo() {
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --scan --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --quality --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;
@@ -98,6 +102,10 @@ _osteo() {
     experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s" ;;
     study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level" ;;
     devices) flags="$flags --watch --recording" ;;
+    markers) flags="$flags --paper --pen --page" ;;
+    calibrate-camera) flags="$flags --out --seconds --width --height --fps --latency-ms" ;;
+    calibrate-pen) flags="$flags --camera --out --pen --ruler-mm --seconds" ;;
+    track-pen) flags="$flags --camera --pen --seconds" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;

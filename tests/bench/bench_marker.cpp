@@ -51,7 +51,7 @@ std::vector<Light> lights() {
 }
 
 void places() {
-  constexpr int kPoses = 60;
+  constexpr int kPoses = 24;
   std::printf("size      light               distance  tip RMS  p95 mm  across  along  angle RMS  p95 deg  lost  CPU ms\n");
   for (const auto& [w, h] : {std::pair{640, 480}, {1280, 720}}) {
     const CameraModel camera = test::webcam(w, h);

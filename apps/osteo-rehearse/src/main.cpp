@@ -106,8 +106,8 @@ class Hands {
     const Pen pen = flags.pen.empty() ? Pen{} : load_pen(flags.pen);
     camera_place_ = flags.camera_place;
     hand_scale_ = flags.hand_scale;
-    link_ = std::make_shared<PenLink>(
-        [from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_, pen);
+    link_ = std::make_shared<PenLink>([from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_,
+                                      pen);
   }
 
   // Two devices of a kind: the first of them is the first hand's.

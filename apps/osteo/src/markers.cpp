@@ -20,7 +20,8 @@ std::string rounded(double value, double steps) {
 }
 
 void refuse_to_replace(const fs::path& path, const cli::Invocation& io) {
-  if (output_exists(path) && !io.common.force) throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "--force replaces it");
+  if (output_exists(path) && !io.common.force)
+    throw Error(ExitCode::cannot_write, "'" + path.string() + "' exists already", "--force replaces it");
 }
 
 // From a camera as long as `seconds`, or until interrupted; from files all there are. `each` returns false when it has enough.
@@ -59,7 +60,8 @@ cli::CommandInfo MarkersCommand::info() {
 int MarkersCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path out = io.arguments[0];
   const std::string kind = out.extension().string();
-  if (kind != ".pdf" && kind != ".png") throw Error(ExitCode::usage, "'" + out.string() + "' is neither a .pdf nor a .png", "name it markers.pdf");
+  if (kind != ".pdf" && kind != ".png")
+    throw Error(ExitCode::usage, "'" + out.string() + "' is neither a .pdf nor a .png", "name it markers.pdf");
   if (kind == ".pdf" && io.given.contains("page")) throw Error(ExitCode::usage, "--page has no effect with a .pdf", "it holds both pages");
   refuse_to_replace(out, io);
   const std::string pdf = marker_pages_pdf(p.paper, p.pen);  // with its check
@@ -73,7 +75,8 @@ int MarkersCommand::run(const Params& p, cli::Invocation& io) {
   }
   io.end_progress();
   if (!io.common.quiet)
-    io.err << out.string() << ": pen " << p.pen << ", every marker read back in its place. Print at 100 %, hold a ruler to the line of 100 mm"
+    io.err << out.string() << ": pen " << p.pen
+           << ", every marker read back in its place. Print at 100 %, hold a ruler to the line of 100 mm"
            << (kind == ".png" ? " (300 dots an inch)" : "") << '\n';
   return 0;
 }
@@ -110,32 +113,30 @@ int CalibrateCameraCommand::run(const Params& p, cli::Invocation& io) {
   write_file(p.out, camera_json(r.camera));
   io.end_progress();
   if (io.common.json) {
-    io.out << Json{{"views", r.camera.views},
-                   {"pictures", calibration.pictures()},
-                   {"rms_px", r.camera.rms_px},
-                   {"worst_view_px", r.worst_view_px},
-                   {"focal_px", r.camera.fx},
-                   {"focal_spread", r.focal_spread},
+    io.out << Json{{"views", r.camera.views},      {"pictures", calibration.pictures()},
+                   {"rms_px", r.camera.rms_px},    {"worst_view_px", r.worst_view_px},
+                   {"focal_px", r.camera.fx},      {"focal_spread", r.focal_spread},
                    {"mirrored", r.camera.mirrored}}
                   .dump(2)
            << '\n';
   }
   if (!io.common.quiet) {
-    io.err << r.camera.width << " x " << r.camera.height << ", " << r.camera.views << " views of " << calibration.pictures() << " pictures: corners "
-           << rounded(r.camera.rms_px, 100) << " pixels off (RMS; worst view " << rounded(r.worst_view_px, 100) << "), focal length "
-           << rounded(r.camera.fx, 1) << " pixels to " << rounded(100 * r.focal_spread, 100) << " %"
+    io.err << r.camera.width << " x " << r.camera.height << ", " << r.camera.views << " views of " << calibration.pictures()
+           << " pictures: corners " << rounded(r.camera.rms_px, 100) << " pixels off (RMS; worst view " << rounded(r.worst_view_px, 100)
+           << "), focal length " << rounded(r.camera.fx, 1) << " pixels to " << rounded(100 * r.focal_spread, 100) << " %"
            << (r.camera.mirrored ? "; its pictures are mirrored" : "") << ": " << p.out << '\n';
   }
   return 0;
 }
 
 cli::CommandInfo CalibratePenCommand::info() {
-  return {"calibrate-pen",
-          "where the tip of a pen with markers is, by turning the pen on it",
-          "Put the tip into a small dent, lean the pen by 30 degrees to all sides and turn it, its markers towards the camera. Refused when "
-          "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than 2 mm (RMS).",
-          {{"source", "/dev/video0, a video, or a folder of pictures"}},
-          "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json"};
+  return {
+      "calibrate-pen",
+      "where the tip of a pen with markers is, by turning the pen on it",
+      "Put the tip into a small dent, lean the pen by 30 degrees to all sides and turn it, its markers towards the camera. Refused when "
+      "it was seen in fewer than 20 pictures, leant by less than 20 degrees, or when the tip wandered by more than 2 mm (RMS).",
+      {{"source", "/dev/video0, a video, or a folder of pictures"}},
+      "osteo calibrate-pen /dev/video0 --camera camera.json -o pen.json"};
 }
 
 int CalibratePenCommand::run(const Params& p, cli::Invocation& io) {
@@ -167,32 +168,32 @@ int CalibratePenCommand::run(const Params& p, cli::Invocation& io) {
   pen.rms_mm = fit.rms_mm;
   const double lean_deg = std::atan2(std::hypot(fit.tip_mm.x, fit.tip_mm.y), -fit.tip_mm.z) * 180 / 3.14159265358979323846;
   if (lean_deg > 8)
-    io.context.warn("the tip lies " + rounded(lean_deg, 1) + " degrees beside the axis of the prism: the drill will lean by that; glue it straight");
+    io.context.warn("the tip lies " + rounded(lean_deg, 1) +
+                    " degrees beside the axis of the prism: the drill will lean by that; glue it straight");
   write_file(p.out, pen_json(pen));
   io.end_progress();
   if (io.common.json)
-    io.out << Json{{"poses", fit.poses},
-                   {"left_out", fit.left_out},
-                   {"rms_mm", fit.rms_mm},
-                   {"worst_mm", fit.worst_mm},
-                   {"tilt_deg", fit.tilt_deg},
-                   {"tip_mm", std::vector<double>{fit.tip_mm.x, fit.tip_mm.y, fit.tip_mm.z}}}
+    io.out << Json{{"poses", fit.poses},       {"left_out", fit.left_out},
+                   {"rms_mm", fit.rms_mm},     {"worst_mm", fit.worst_mm},
+                   {"tilt_deg", fit.tilt_deg}, {"tip_mm", std::vector<double>{fit.tip_mm.x, fit.tip_mm.y, fit.tip_mm.z}}}
                   .dump(2)
            << '\n';
   if (!io.common.quiet)
     io.err << "tip " << rounded(length(fit.tip_mm), 10) << " mm from the middle of the prism, by " << fit.poses << " of " << pictures
-           << " pictures: it wandered by " << rounded(fit.rms_mm, 100) << " mm (RMS; most " << rounded(fit.worst_mm, 100) << "): " << p.out << '\n';
+           << " pictures: it wandered by " << rounded(fit.rms_mm, 100) << " mm (RMS; most " << rounded(fit.worst_mm, 100) << "): " << p.out
+           << '\n';
   return 0;
 }
 
 cli::CommandInfo TrackPenCommand::info() {
-  return {"track-pen",
-          "try a camera and a pen: where the tip is, picture by picture",
-          "A table as CSV on standard output: time, whether the pen is seen, the tip as seen and as smoothed (mm from the lens: right, down, "
-          "ahead), direction of the handle, error of the corners. At the end how many pictures were lost and why. The same code that moves "
-          "the drill in the window.",
-          {{"source", "/dev/video0, a video, or a folder of pictures"}},
-          "osteo track-pen /dev/video0 --camera camera.json --pen pen.json > tip.csv"};
+  return {
+      "track-pen",
+      "try a camera and a pen: where the tip is, picture by picture",
+      "A table as CSV on standard output: time, whether the pen is seen, the tip as seen and as smoothed (mm from the lens: right, down, "
+      "ahead), direction of the handle, error of the corners. At the end how many pictures were lost and why. The same code that moves "
+      "the drill in the window.",
+      {{"source", "/dev/video0, a video, or a folder of pictures"}},
+      "osteo track-pen /dev/video0 --camera camera.json --pen pen.json > tip.csv"};
 }
 
 int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
@@ -206,7 +207,8 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
   bool mirrored = false;
   double sum_px2 = 0;
   Json rows = Json::list();
-  if (!io.common.json) io.out << "time_s,state,markers,rms_px,tip_x_mm,tip_y_mm,tip_z_mm,smooth_x_mm,smooth_y_mm,smooth_z_mm,axis_x,axis_y,axis_z\n";
+  if (!io.common.json)
+    io.out << "time_s,state,markers,rms_px,tip_x_mm,tip_y_mm,tip_z_mm,smooth_x_mm,smooth_y_mm,smooth_z_mm,axis_x,axis_y,axis_z\n";
   look_at_all(io.arguments[0], camera, p.seconds, io, [&](const GrayPicture& picture, double time_s, std::uint64_t) {
     const PenSight s = tracker.look(picture);
     ++pictures;
@@ -219,8 +221,8 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
       sum_px2 += s.rms_px * s.rms_px;
       filter.add(time_s, s);
       const Vec3 raw = s.camera_from_body(pen.tip_mm), smooth = filter.motion().tip_mm, axis = filter.motion().rotation.column[2];
-      std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n), ",%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", s.rms_px, raw.x, raw.y,
-                    raw.z, smooth.x, smooth.y, smooth.z, axis.x, axis.y, axis.z);
+      std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n), ",%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", s.rms_px,
+                    raw.x, raw.y, raw.z, smooth.x, smooth.y, smooth.z, axis.x, axis.y, axis.z);
     } else {
       std::snprintf(line + n, sizeof line - static_cast<std::size_t>(n), ",,,,,,,,,,");
     }
@@ -230,20 +232,23 @@ int TrackPenCommand::run(const Params& p, cli::Invocation& io) {
   io.end_progress();
   const int seen = count[0];
   if (io.common.json)
-    io.out << Json{{"pictures", pictures}, {"seen", seen},          {"nothing", count[1]}, {"ambiguous", count[2]},
-                   {"doubled", count[3]},  {"unlike", count[4]},    {"dark", dark},        {"mirrored", mirrored},
-                   {"rms_px", seen > 0 ? std::sqrt(sum_px2 / seen) : 0.0}}
+    io.out << Json{{"pictures", pictures},  {"seen", seen},         {"nothing", count[1]},
+                   {"ambiguous", count[2]}, {"doubled", count[3]},  {"unlike", count[4]},
+                   {"dark", dark},          {"mirrored", mirrored}, {"rms_px", seen > 0 ? std::sqrt(sum_px2 / seen) : 0.0}}
                   .dump(2)
            << '\n';
   if (mirrored) io.context.warn("the pictures are mirrored otherwise than when the camera was calibrated; they were turned back");
-  if (p.pen.empty()) io.context.warn("no --pen: its tip is taken to be 100 mm below the middle of the prism; 'osteo calibrate-pen' finds it");
+  if (p.pen.empty())
+    io.context.warn("no --pen: its tip is taken to be 100 mm below the middle of the prism; 'osteo calibrate-pen' finds it");
   if (!io.common.quiet)
-    io.err << "seen in " << seen << " of " << pictures << " pictures" << (count[2] > 0 ? "; too little of it in " + std::to_string(count[2]) : "")
+    io.err << "seen in " << seen << " of " << pictures << " pictures"
+           << (count[2] > 0 ? "; too little of it in " + std::to_string(count[2]) : "")
            << (count[3] > 0 ? "; two with the same print in " + std::to_string(count[3]) : "")
            << (count[4] > 0 ? "; markers that are not this pen in " + std::to_string(count[4]) : "")
            << (dark > 0 ? "; too dark in " + std::to_string(dark) : "") << '\n';
-  if (seen == 0) throw Error(ExitCode::failed, "pen " + std::to_string(pen.pen) + " was not seen in any of " + std::to_string(pictures) + " pictures",
-                             "more light, nearer, its markers towards the camera; docs/marker.md");
+  if (seen == 0)
+    throw Error(ExitCode::failed, "pen " + std::to_string(pen.pen) + " was not seen in any of " + std::to_string(pictures) + " pictures",
+                "more light, nearer, its markers towards the camera; docs/marker.md");
   return 0;
 }
 

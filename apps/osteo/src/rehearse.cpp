@@ -83,7 +83,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
   if (!p.headless) {
     for (const char* const name : {"script", "side", "seconds", "fast"}) refuse(name, "in the window", "add --headless, or leave it out");
   } else {
-    for (const char* const name : {"device", "arm", "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
+    for (const char* const name :
+         {"device", "arm", "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
       refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
     for (const char* const name :
          {"quality", "width", "height", "state_file", "scan", "sound", "volume", "alarms", "stereo", "stereo_base", "experiment"})

@@ -36,7 +36,8 @@ struct CameraFields {
     visit({"p2", "the same, across", "", -1, 1}, f.p2);
     visit({"mirrored", "the camera delivers mirrored pictures"}, c.mirrored);
     visit({"fps", "pictures a second that it is asked for", "Hz", 1, 1000}, c.fps);
-    visit({"latency_ms", "from the middle of an exposure until the picture is here (below 0: not known, one period is taken)", "ms", -1, 1000},
+    visit({"latency_ms", "from the middle of an exposure until the picture is here (below 0: not known, one period is taken)", "ms", -1,
+           1000},
           c.latency_ms);
     visit({"rms_px", "of its calibration", "pixels", 0, 1000}, c.rms_px);
     visit({"views", "of its calibration", "", 0, 100000}, c.views);
@@ -53,7 +54,8 @@ CameraModel load_camera(const fs::path& path) {
   file.read(file.root(), "", fields_of<CameraFields>(f));
   CameraModel& c = f.camera;
   c.distortion = {f.radial[0], f.radial[1], f.p1, f.p2, f.radial[2]};
-  if (std::abs(c.cx - 0.5 * c.width) > 0.5 * c.width || std::abs(c.cy - 0.5 * c.height) > 0.5 * c.height || c.fx > 2 * c.fy || c.fy > 2 * c.fx)
+  if (std::abs(c.cx - 0.5 * c.width) > 0.5 * c.width || std::abs(c.cy - 0.5 * c.height) > 0.5 * c.height || c.fx > 2 * c.fy ||
+      c.fy > 2 * c.fx)
     throw Error(ExitCode::usage, "'" + path.string() + "' describes a lens that looks past its own picture, or one far from square pixels",
                 "calibrate the camera again: osteo calibrate-camera");
   return c;
@@ -85,8 +87,9 @@ Look CameraCalibration::add(const GrayPicture& picture) {
     height_ = picture.height;
   }
   if (picture.width != width_ || picture.height != height_)
-    throw Error(ExitCode::usage, "pictures of different sizes: " + std::to_string(width_) + " x " + std::to_string(height_) + " and " +
-                                     std::to_string(picture.width) + " x " + std::to_string(picture.height),
+    throw Error(ExitCode::usage,
+                "pictures of different sizes: " + std::to_string(width_) + " x " + std::to_string(height_) + " and " +
+                    std::to_string(picture.width) + " x " + std::to_string(picture.height),
                 "a camera is calibrated at one size");
   ++pictures_;
   const auto& board = marker::plate_board();
@@ -131,7 +134,8 @@ Look CameraCalibration::add(const GrayPicture& picture) {
   }
   const cv::Mat plane = cv::findHomography(flat, seen, cv::RANSAC, 3);
   if (plane.empty()) return Look::no_plate;
-  const float w = static_cast<float>(PlateBody::kAcross * PlateBody::kSquareMm), h = static_cast<float>(PlateBody::kDown * PlateBody::kSquareMm);
+  const float w = static_cast<float>(PlateBody::kAcross * PlateBody::kSquareMm),
+              h = static_cast<float>(PlateBody::kDown * PlateBody::kSquareMm);
   std::vector<cv::Point2f> outline;
   cv::perspectiveTransform(std::vector<cv::Point2f>{{0, 0}, {w, 0}, {w, h}, {0, h}}, outline, plane);
   for (std::size_t c = 0; c < 4; ++c) {
@@ -179,8 +183,9 @@ CameraCalibration::Result CameraCalibration::solve() const {
   cv::Mat k, d, spread, ignored, view_errors;
   std::vector<cv::Mat> turns, shifts;
   double rms = 0;
+  // Without k3: a webcam's lens needs none, and few views bend it as they like where no corner was seen.
   try {
-    rms = cv::calibrateCamera(object, image, {width_, height_}, k, d, turns, shifts, spread, ignored, view_errors, 0,
+    rms = cv::calibrateCamera(object, image, {width_, height_}, k, d, turns, shifts, spread, ignored, view_errors, cv::CALIB_FIX_K3,
                               cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-10));
   } catch (const cv::Exception&) {
     throw Error(ExitCode::failed, "no lens explains these views", "take them again: a flat plate, in focus, held still, tilted every way");
@@ -209,7 +214,8 @@ CameraCalibration::Result CameraCalibration::solve() const {
   if (!(rms <= kMostRmsPx)) {
     char text[64];
     std::snprintf(text, sizeof text, "%.2f", rms);
-    throw Error(ExitCode::failed, std::string("corners lie ") + text + " pixels (RMS) from where the lens would show them; at most 1 is taken",
+    throw Error(ExitCode::failed,
+                std::string("corners lie ") + text + " pixels (RMS) from where the lens would show them; at most 1 is taken",
                 "the plate has to be flat (glue it to a board), in focus and still; turn autofocus and picture stabilisation off");
   }
   // A plate that is never tilted leaves the focal length open, and the spread does not tell: it is that of the lens that was found. What

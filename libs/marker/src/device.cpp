@@ -130,7 +130,8 @@ void PenLink::tell(const PenSight& sight, bool) {
   if (sight.state == Sight::doubled) return say("two pens with the same print are in the picture: take one away, or print pen 2");
   if (sight.state == Sight::unlike)
     return say("markers are seen, but they do not make up this pen: another print, one glued otherwise, or another camera's file");
-  if (sight.state == Sight::ambiguous) return say("too little of the pen is seen to tell how it is held: nearer, in better light, no finger over its markers");
+  if (sight.state == Sight::ambiguous)
+    return say("too little of the pen is seen to tell how it is held: nearer, in better light, no finger over its markers");
   if (sight.other_pen) return say("markers of another pen are seen, none of pen " + std::to_string(pen_.pen));
   say("the camera sees no marker of pen " + std::to_string(pen_.pen));
 }

@@ -57,7 +57,7 @@ bool fit_line(std::vector<EdgePoint>& points, Line& line) {
 bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
   Quad q = quad;
   double moved_most = 0;
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 8; ++round) {
     std::array<std::array<double, 4>, 4> lines;  // a point and a direction
     for (std::size_t e = 0; e < 4; ++e) {
       const auto &a = q[e], &b = q[(e + 1) % 4], &c = q[(e + 2) % 4], &d = q[(e + 3) % 4];
@@ -67,8 +67,9 @@ bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
       const double far = -(((c[0] + d[0]) - (a[0] + b[0])) * nx + ((c[1] + d[1]) - (a[1] + b[1])) * ny) / 2;
       const double cell_px = far / cells;
       if (!(cell_px > 1.5)) return false;
-      // Inside a cell of black, outside half a cell of white.
-      const double reach = std::clamp(0.45 * cell_px, 1.5, 5.0);
+      // Inside a cell of black, outside half a cell of white, less where the next face begins. First far enough to find the edge; then a
+      // short reach, the same to both sides of where the line is by now, so that what is cut off of a blurred edge is the same on both.
+      const double reach = round == 0 ? std::clamp(0.4 * cell_px, 1.5, 5.0) : std::clamp(0.25 * cell_px, 1.0, 1.5);
       const int count = std::clamp(static_cast<int>(long_px), 8, 60);
       std::vector<EdgePoint> points;
       for (int i = 0; i < count; ++i) {
@@ -105,8 +106,8 @@ bool refine_corners(const cv::Mat& gray, Quad& quad, int cells) {
       const double t = ((m[0] - l[0]) * m[3] - (m[1] - l[1]) * m[2]) / d;
       q[c] = {l[0] + t * l[2], l[1] + t * l[3]};
     }
-    if (moved_most > 0.7) return false;
-    if (moved_most < 0.01) break;
+    if (moved_most > 0.8) return false;
+    if (round > 0 && moved_most < 0.01) break;
     moved_most = 0;
   }
   quad = q;

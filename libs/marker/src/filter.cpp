@@ -78,8 +78,7 @@ void PenFilter::add(double time_s, const PenSight& sight) {
   const Vec3 arm = sight.camera_from_body.rotation * tip_mm_;
   // A corner's error is what the corners of this picture show, and at least what is known of corners.
   const double px = std::max(params_.corner_px, sight.rms_px);
-  const Eigen::Matrix<double, 6, 6> all =
-      Eigen::Map<const Matrix6>(sight.covariance_a_px2.data()) * (px * px);
+  const Eigen::Matrix<double, 6, 6> all = Eigen::Map<const Matrix6>(sight.covariance_a_px2.data()) * (px * px);
   Eigen::Matrix<double, 3, 6> j;  // of the tip by turn and shift
   j.leftCols<3>() << 0, arm.z, -arm.y, -arm.z, 0, arm.x, arm.y, -arm.x, 0;
   j.rightCols<3>().setIdentity();
@@ -94,10 +93,12 @@ void PenFilter::add(double time_s, const PenSight& sight) {
     return;
   }
   Matrix6 p = tip_map;
-  const auto lively = [&](double speed, double all_from) {
-    return params_.rest_share + (1 - params_.rest_share) * std::min(1.0, speed * speed / (all_from * all_from));
+  // Of a speed only what is more than it may be wrong by counts: noise is no motion.
+  const auto lively = [&](Vec3 speed, const Matrix6& known, double all_from) {
+    const double sure = std::max(0.0, dot(speed, speed) - 2 * known.bottomRightCorner<3, 3>().trace());
+    return params_.rest_share + (1 - params_.rest_share) * std::min(1.0, sure / (all_from * all_from));
   };
-  carry_on(p, dt, params_.acceleration_mm2_s3 * lively(length(motion_.velocity_mm_s), params_.moving_mm_s));
+  carry_on(p, dt, params_.acceleration_mm2_s3 * lively(motion_.velocity_mm_s, p, params_.moving_mm_s));
   const Vec3 expected = motion_.tip_mm + motion_.velocity_mm_s * dt;
   const auto by = correct(p, tip_r, eigen_of(measured_mm - expected));
   motion_.tip_mm = expected + vec_of(by.head<3>());
@@ -105,7 +106,7 @@ void PenFilter::add(double time_s, const PenSight& sight) {
   tip_map = p;
 
   p = turn_map;
-  carry_on(p, dt, params_.turning_rad2_s3 * lively(length(motion_.turning_rad_s), params_.turning_rad_s));
+  carry_on(p, dt, params_.turning_rad2_s3 * lively(motion_.turning_rad_s, p, params_.turning_rad_s));
   const Mat3 turned = product(turn_by(motion_.turning_rad_s * dt), motion_.rotation);
   const auto turn = correct(p, turn_r, eigen_of(vector_of(product(sight.camera_from_body.rotation, transposed(turned)))));
   motion_.rotation = orthonormal(product(turn_by(vec_of(turn.head<3>())), turned));

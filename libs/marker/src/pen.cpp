@@ -27,7 +27,8 @@ struct PenFields {
     visit({"pen", "which print it carries", "", 1, PenBody::kMostPens}, f.pen.pen);
     visit({"scale", "printed mm for a drawn one", "", 0.5, 2}, f.pen.scale);
     visit({"tip_mm", "its tip, from the middle of the prism, z along the pen to its upper end", "mm", -500, 500, true}, f.tip_mm);
-    visit({"rms_mm", "how far the tip seemed to wander while the pen was turned on it (below 0: it was not)", "mm", -1, 1000}, f.pen.rms_mm);
+    visit({"rms_mm", "how far the tip seemed to wander while the pen was turned on it (below 0: it was not)", "mm", -1, 1000},
+          f.pen.rms_mm);
   }
 };
 

@@ -1,6 +1,7 @@
 #include "osteo/marker/picture.h"
 
 #include <algorithm>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
@@ -38,7 +39,8 @@ class Folder final : public PictureSource {
     if (at_ == files_.size()) return false;
     const fs::path& file = files_[at_++];
     const cv::Mat m = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-    if (m.empty()) throw Error(ExitCode::corrupt, "'" + file.string() + "' cannot be read as a picture", "copy the file again, or take it out");
+    if (m.empty())
+      throw Error(ExitCode::corrupt, "'" + file.string() + "' cannot be read as a picture", "copy the file again, or take it out");
     picture = gray_of(m);
     return true;
   }
@@ -71,7 +73,8 @@ class Video final : public PictureSource {
 
 // "/dev/video0" or "0".
 bool is_camera(const std::string& from) {
-  return from.rfind("/dev/video", 0) == 0 || (!from.empty() && from.size() <= 2 && from.find_first_not_of("0123456789") == std::string::npos);
+  return from.rfind("/dev/video", 0) == 0 ||
+         (!from.empty() && from.size() <= 2 && from.find_first_not_of("0123456789") == std::string::npos);
 }
 
 }  // namespace
@@ -84,6 +87,8 @@ void mirror(GrayPicture& p) {
 }
 
 std::unique_ptr<PictureSource> open_pictures(const std::string& from, int width, int height, double fps) {
+  // What went wrong is said here, and without the names of files.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   if (is_camera(from)) {
     const std::string path = from[0] == '/' ? from : "/dev/video" + from;
     if (!fs::exists(path))

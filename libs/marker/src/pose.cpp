@@ -116,9 +116,8 @@ class PoseFit {
 
   // Every marker is seen from outside.
   [[nodiscard]] bool faces_camera(const RigidTransform& pose) const {
-    return std::all_of(seen_.begin(), seen_.end(), [&](const MarkerCorners& m) {
-      return dot(pose.rotation * m.patch.out(), pose(m.patch.centre_mm)) < 0;
-    });
+    return std::all_of(seen_.begin(), seen_.end(),
+                       [&](const MarkerCorners& m) { return dot(pose.rotation * m.patch.out(), pose(m.patch.centre_mm)) < 0; });
   }
 
   // Both poses that one flat marker may have (T. Collins, A. Bartoli, IJCV 109(3), 2014).
@@ -205,7 +204,8 @@ PenSight pose_of(const CameraModel& camera, const std::vector<MarkerCorners>& al
     // Of one flat side, from afar: another pose that explains it nearly as well.
     if (on_one_plane(seen)) {
       for (const Fit& other : fits) {
-        if (angle_between(other.pose.rotation, fits.front().pose.rotation) < 5 * kDegree || other.cost > 4 * fits.front().cost + 0.1) continue;
+        if (angle_between(other.pose.rotation, fits.front().pose.rotation) < 5 * kDegree || other.cost > 4 * fits.front().cost + 0.1)
+          continue;
         if (guess == nullptr) {
           sight.state = PenSight::State::ambiguous;
           return sight;

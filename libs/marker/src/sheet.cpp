@@ -83,7 +83,8 @@ class Page {
     const double c = p.size_mm / n;
     for (int y = 0; y < n; ++y) {
       for (int x = 0; x < n; ++x) {
-        if (cell[static_cast<std::size_t>(y * n + x)] != 0) cairo_rectangle(cairo_, (p.x_mm + x * c) * dots_, (p.y_mm + y * c) * dots_, c * dots_, c * dots_);
+        if (cell[static_cast<std::size_t>(y * n + x)] != 0)
+          cairo_rectangle(cairo_, (p.x_mm + x * c) * dots_, (p.y_mm + y * c) * dots_, c * dots_, c * dots_);
       }
     }
     // All at once: no hair lines between them.
@@ -115,7 +116,8 @@ std::vector<Place> places_of_pen(Size s, int pen) {
   const auto markers = pen_markers(pen);
   const double margin = (cell - PenBody::kMarkerMm) / 2;
   for (int i = 0; i < 12; ++i)
-    all.push_back({markers[static_cast<std::size_t>(i)].id, left + (i % 6) * cell + margin, kStripTop + (i / 6) * cell + margin, PenBody::kMarkerMm});
+    all.push_back(
+        {markers[static_cast<std::size_t>(i)].id, left + (i % 6) * cell + margin, kStripTop + (i / 6) * cell + margin, PenBody::kMarkerMm});
   const double m = PenBody::kCapMarkerMm;
   all.push_back({markers[12].id, left + 1.5 * cell - m / 2, kStripTop - PenBody::kApothemMm - m / 2, m});
   return all;
@@ -137,10 +139,11 @@ void draw_pen(const Page& page, int pen) {
   const Size s = page.size();
   const double left = strip_left(s), w = PenBody::kFaceMm, h = PenBody::kHeightMm, a = PenBody::kApothemMm;
   page.text("Osteotome: markers of pen " + std::to_string(pen), left, 9, 120, 4.5);
-  page.text("Stiff paper. Cut along the outline, fold along the dashed lines, glue the flap under the first face: a prism of six sides. Fold "
-            "the lid with the marker over the upper end, the lid with the circle under the lower one; tape both. The pen goes in through the "
-            "circle, its tip down, as far as it stands firmly in the middle; glue it. Nothing may bend or shine.",
-            left + 76, 17, s.width_mm - 2 * left - 76, 2.9);
+  page.text(
+      "Stiff paper. Cut along the outline, fold along the dashed lines, glue the flap under the first face: a prism of six sides. Fold "
+      "the lid with the marker over the upper end, the lid with the circle under the lower one; tape both. The pen goes in through the "
+      "circle, its tip down, as far as it stands firmly in the middle; glue it. Nothing may bend or shine.",
+      left + 76, 17, s.width_mm - 2 * left - 76, 2.9);
   const double bottom = kStripTop + h;
   page.line(left, kStripTop, left + 6 * w + 8, kStripTop, 0.75);
   page.line(left, bottom, left + 6 * w + 8, bottom, 0.75);
@@ -207,7 +210,8 @@ GrayPicture marker_page(Paper paper, int pen, int number, double dots_per_inch) 
   const unsigned char* const data = cairo_image_surface_get_data(surface.get());
   const int stride = cairo_image_surface_get_stride(surface.get());
   for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) p.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] = data[y * stride + 4 * x];
+    for (int x = 0; x < w; ++x)
+      p.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] = data[y * stride + 4 * x];
   }
   return p;
 }
@@ -232,7 +236,8 @@ PageCheck check_page(Paper paper, int pen, int number) {
       if (ids[i] != p.id) continue;
       ++check.markers;
       // A pixel's middle is half a pixel from its border.
-      const double want[4][2] = {{p.x_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm + p.size_mm}, {p.x_mm, p.y_mm + p.size_mm}};
+      const double want[4][2] = {
+          {p.x_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm}, {p.x_mm + p.size_mm, p.y_mm + p.size_mm}, {p.x_mm, p.y_mm + p.size_mm}};
       for (std::size_t c = 0; c < 4; ++c)
         check.worst_mm = std::max(check.worst_mm, std::hypot((static_cast<double>(corners[i][c].x) + 0.5) / kDots - want[c][0],
                                                              (static_cast<double>(corners[i][c].y) + 0.5) / kDots - want[c][1]));
@@ -245,8 +250,9 @@ std::string marker_pages_pdf(Paper paper, int pen) {
   for (int p = 0; p < kMarkerPages; ++p) {
     const PageCheck check = check_page(paper, pen, p);
     if (check.markers != check.expected || !(check.worst_mm < 0.1))
-      throw Error(ExitCode::failed, "page " + std::to_string(p + 1) + " does not read as it should: " + std::to_string(check.markers) + " of " +
-                                        std::to_string(check.expected) + " markers, off by up to " + std::to_string(check.worst_mm) + " mm",
+      throw Error(ExitCode::failed,
+                  "page " + std::to_string(p + 1) + " does not read as it should: " + std::to_string(check.markers) + " of " +
+                      std::to_string(check.expected) + " markers, off by up to " + std::to_string(check.worst_mm) + " mm",
                   "this is a defect of the program or of its libraries; please report it");
   }
   std::string pdf;

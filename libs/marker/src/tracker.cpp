@@ -157,10 +157,12 @@ struct PenTracker::Inside {
       return sight;
     }
     std::vector<MarkerCorners> corners;
+    std::vector<MarkerCorners> rough;  // a contour's corners lie inside of the true ones: with enough others they only mislead
     for (auto& [id, d] : once) {
-      marker::refine_corners(gray, d.quad, cells);
-      corners.push_back({*patch(id), d.quad});
+      const bool fine = marker::refine_corners(gray, d.quad, cells);
+      (fine ? corners : rough).push_back({*patch(id), d.quad});
     }
+    if (corners.size() < 2) corners.insert(corners.end(), rough.begin(), rough.end());
     take(sight, pose_of(camera, corners, guess));
     if (sight.state == PenSight::State::seen) add_the_slanting(gray, corners, sight);
     return sight;

@@ -101,7 +101,7 @@ TEST(Tracker, SeesThePenFromAllSidesInPicturesOfAWebcam) {
   Renderer renderer(camera, test::pen_faces());
   PenTracker tracker(camera, 1);
   double square = 0, worst = 0;
-  constexpr int kPictures = 24;
+  constexpr int kPictures = 12;
   for (int i = 0; i < kPictures; ++i) {
     const RigidTransform pose =
         pen_pose(300 + 6.0 * i, 15.0 * i, 25 * std::sin(i), 20 * std::cos(2.0 * i), {40 * std::sin(0.5 * i), 20, 0});

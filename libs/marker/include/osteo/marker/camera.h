@@ -45,8 +45,8 @@ class CameraCalibration {
 
   struct Result {
     CameraModel camera;
-    double worst_view_px = 0;              ///< RMS of the worst view
-    double focal_spread = 0;               ///< standard deviation of fx by fx
+    double worst_view_px = 0;                ///< RMS of the worst view
+    double focal_spread = 0;                 ///< standard deviation of fx by fx
     double seen_width = 0, seen_height = 0;  ///< share of the picture over which corners were seen
     std::vector<std::string> doubts;
   };

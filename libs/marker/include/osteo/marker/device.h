@@ -37,8 +37,8 @@ class PenLink {
   PenLink& operator=(const PenLink&) = delete;
 
   struct State {
-    PenMotion motion;           ///< time_s is unused: of_ns counts
-    std::int64_t of_ns = 0;     ///< monotonic, of the exposure; 0: the pen is not in sight
+    PenMotion motion;        ///< time_s is unused: of_ns counts
+    std::int64_t of_ns = 0;  ///< monotonic, of the exposure; 0: the pen is not in sight
     std::uint64_t pictures = 0;
   };
   /// The reader's: false while it is being written.

@@ -20,14 +20,14 @@ struct PenMotion {
   [[nodiscard]] Mat3 rotation_at(double time_s) const;
 };
 
-/// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows quicker and lets more noise
-/// through; chosen by measured error while moving and jitter at rest (docs/marker.md).
+/// How lively a hand is taken to be: the spectral density of its acceleration, less while it rests. More follows quicker and lets more
+/// noise through; chosen by measured error while moving and jitter at rest (docs/marker.md).
 struct PenFilterParams {
   double acceleration_mm2_s3 = 2e5;
   double turning_rad2_s3 = 60;
-  double rest_share = 0.001;    ///< of both at rest; all of it from these speeds on, between with their squares
+  double rest_share = 0.001;  ///< of both at rest; all of it from these speeds on, between with their squares
   double moving_mm_s = 25, turning_rad_s = 0.25;
-  double corner_px = 0.1;       ///< corners are never taken to be known better
+  double corner_px = 0.1;  ///< corners are never taken to be known better
 };
 
 /// Kalman filters of constant velocity, of tip and rotation, each measured with the covariance that the picture gives: across the view

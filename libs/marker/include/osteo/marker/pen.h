@@ -11,10 +11,10 @@ namespace osteo {
 
 /// A pen with its print.
 struct Pen {
-  int pen = 1;        ///< which of the prints
-  double scale = 1;   ///< printed mm for a drawn one, by the ruler line on the page
+  int pen = 1;                         ///< which of the prints
+  double scale = 1;                    ///< printed mm for a drawn one, by the ruler line on the page
   Vec3 tip_mm = PenBody::kUsualTipMm;  ///< in the body's frame
-  double rms_mm = -1;  ///< how far the tip seemed to wander while the pen was turned on it; below 0: it was not
+  double rms_mm = -1;                  ///< how far the tip seemed to wander while the pen was turned on it; below 0: it was not
 };
 /// Error(no_input), Error(usage) with the line.
 [[nodiscard]] Pen load_pen(const std::filesystem::path& path);
