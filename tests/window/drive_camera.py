@@ -76,12 +76,16 @@ def camera():
         at = key("g", "look at the drill", lambda s: apart(s["focus_mm"], s["at_mm"]) < 1)
         w.x("key", "shift+F6")
         w.until("kept", lambda s: s["message"] == "view 1 kept")
+        # Along the handle as it is; then the mouse's handle follows the view.
+        handle = w.next()["axis"]
+        while apart(handle, (now := w.next()["axis"])) > 1e-4:
+            handle = now
         w.x("key", "shift+g")
-        w.until("along the drill", lambda s: dot(s["view_back"], s["axis"]) > 0.99999 and not s["camera_moves"])
+        w.until("along the drill", lambda s: dot(s["view_back"], handle) > 0.9999 and not s["camera_moves"])
         key("F6", "back to the view", lambda s: dot(s["view_back"], at["view_back"]) > 0.99999 and apart(s["focus_mm"], at["focus_mm"]) < 1e-9)
         for name, n in (("F7", 2), ("F8", 3)):
             key(name, "says that none is kept", lambda s: f"no view {n}" in s["message"])
-        key("BackSpace", "along the drill again", lambda s: dot(s["view_back"], s["axis"]) > 0.99999)
+        key("BackSpace", "along the drill again", lambda s: dot(s["view_back"], handle) > 0.9999)
         for name in ("KP_Left", "KP_Right", "KP_Up", "KP_Down"):
             pressed.add(name)
             before = rests(w)
@@ -117,16 +121,22 @@ def camera():
         w.close()
         assert there and not pathlib.Path("first/camera-trial.csv").exists(), "no view was reached"
         # Stereo: what is on the screen.
-        pictures = {}
+        pictures, places = {}, []
         for mode in ("anaglyph", "side_by_side", "interlaced", "top_bottom"):
             w = Window("--no-sound", "--stereo", mode, "--stereo-base", 30, "-o", mode)
             w.key("bracketright", "4 times", lambda s: s["magnification"] == 4 and not s["camera_moves"])
-            w.x("mousemove", 2, 2)  # no tip of a button
+            # The drill to the same place, where the squeezed picture shows it; then the mouse away.
+            w.x("mousemove", LEFT + 130 // (2 if mode == "side_by_side" else 1), 100 // (2 if mode == "top_bottom" else 1))
+            w.next(3)  # it has been heard of
+            w.until("the drill rests", lambda s: apart(s["at_mm"], s["goal_mm"]) < 1e-3)
+            w.x("mousemove", 2, 2)
             w.next(3)
+            places.append(w.state()["at_mm"])
             w.key("s", "screenshot", lambda s: s["message"].startswith("saved"))
             assert w.state()["stereo"] > 0
             w.close()
             pictures[mode] = png(f"{mode}/screenshot-1.png")
+    assert all(apart(p, places[0]) < 0.01 for p in places), places
     red, blue = 0, 2
     rows, columns = range(20, 560, 3), range(LEFT + 20, 1000 - RIGHT - 20, 5)
     eyes = pictures["anaglyph"]

@@ -302,7 +302,8 @@ def hand():
             eye = s["eye"]
             for _ in range(40):
                 w.x("mousemove", 600, 330)
-                s = w.drag(3, *((-170, 0) if turn < 4 else (0, 60)))
+                # Around, then up, then down again: the head stays up, so the camera does not go over the top.
+                s = w.drag(3, *((-170, 0) if turn < 4 else (0, 60) if turn == 4 else (0, -60)))
                 if dot(s["eye"], eye) < 0.4:
                     break
             assert dot(s["eye"], eye) < 0.4, (turn, s)

@@ -64,11 +64,11 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   if (ImGui::Button("drill (G)")) scope.control.look_at(scene.drill_mm);
   ImGui::SameLine();
   if (ImGui::Button("along it")) scope.control.look_along(scene.drill_mm, scene.handle);
-  ImGui::SameLine();
-  if (ImGui::Button("back##camera")) static_cast<void>(scope.control.undo());
   ImGui::Text("%s", scope_words(scope.view()).c_str());
   if (!ImGui::TreeNode("microscope", "Microscope")) return;
   ScopeControl& control = scope.control;
+  ImGui::PushItemWidth(-90);  // room for their names
+  if (ImGui::Button("Camera back (Backspace)", {-1, 0})) static_cast<void>(control.undo());
   auto m = static_cast<float>(scope.view().magnification);
   if (ImGui::SliderFloat("x", &m, 0.5F, 40, "%.1f", ImGuiSliderFlags_Logarithmic))
     control.zoom(static_cast<double>(m) / scope.view().magnification);
@@ -99,6 +99,7 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   }
   ImGui::Text("Stereo");
   draw_stereo(stereo);
+  ImGui::PopItemWidth();
   ImGui::TreePop();
 }
 

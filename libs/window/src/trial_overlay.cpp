@@ -49,7 +49,9 @@ void TrialOverlay::draw(const ScopeView& view, const PictureArea& area) const {
   char words[96];
   std::snprintf(words, sizeof words, "view %zu of %zu, %.1fx: %.1f s%s", trial_->results().size() + 1, trial_->count(), t.magnification,
                 trial_->seconds(), close ? ", hold" : "");
-  list->AddText({static_cast<float>(area.x) + 16, static_cast<float>(area.y) + 16}, ink, words);
+  const ImVec2 at{static_cast<float>(area.x) + 16, static_cast<float>(area.y) + 16}, size = ImGui::CalcTextSize(words);
+  list->AddRectFilled({at.x - 8, at.y - 6}, {at.x + size.x + 8, at.y + size.y + 6}, IM_COL32(10, 14, 20, 170), 4);
+  list->AddText(at, ink, words);
   list->PopClipRect();
 }
 
