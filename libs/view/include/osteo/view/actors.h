@@ -18,8 +18,6 @@ namespace osteo {
 [[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
-/// Metal: plates and screws.
-[[nodiscard]] vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh);
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);
 /// Dark blue background, key, fill and head light.
 void set_up_scene(vtkRenderer* renderer);
