@@ -42,16 +42,6 @@ void set_bone_wetness(vtkProperty* p, double share) {
   p->SetSpecularPower(20 + 60 * wet);
 }
 
-vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh) {
-  auto actor = make_bone_actor(to_vtk(mesh));
-  vtkProperty* const p = actor->GetProperty();
-  p->SetColor(0.62, 0.66, 0.74);
-  p->SetDiffuse(0.72);
-  p->SetSpecular(0.32);
-  p->SetSpecularPower(30);
-  return actor;
-}
-
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& t) {
   for (int r = 0; r < 3; ++r) {
     const auto a = static_cast<std::size_t>(r);

@@ -18,8 +18,6 @@
 #include <cmath>
 #include <optional>
 
-#include "osteo/bone/plates.h"
-#include "osteo/bone/world_mesh.h"
 #include "osteo/io/vtk_data.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
@@ -34,17 +32,14 @@ constexpr std::chrono::milliseconds kStill{300};
 
 }  // namespace
 
-WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures) : renderer_(renderer), structures_(structures) {}
+WorldView::WorldView(vtkRenderer* renderer, const StructureMap* structures)
+    : renderer_(renderer), structures_(structures), plates_(renderer) {}
 
 WorldView::~WorldView() {
   stop_ = true;
   if (coarsening_.valid()) coarsening_.wait();
   if (looking_.valid()) looking_.wait();
   if (soft_actor_) renderer_->RemoveActor(soft_actor_);
-  for (auto& [id, p] : plates_) {
-    renderer_->RemoveActor(p.actor);
-    if (p.moving) renderer_->RemoveActor(p.moving);
-  }
 }
 
 void WorldView::update(const World& world, SceneReaders& readers) {
@@ -80,29 +75,7 @@ void WorldView::update(const World& world, SceneReaders& readers) {
     }
     view->place(placed.world_from_body);
   }
-  std::erase_if(plates_, [&](auto& p) {
-    for (const Fixture& f : world.fixtures()) {
-      if (f.id == p.first) return false;
-    }
-    renderer_->RemoveActor(p.second.actor);
-    if (p.second.moving) renderer_->RemoveActor(p.second.moving);
-    return true;
-  });
-  for (const Fixture& f : world.fixtures()) {
-    const PlateModel& model = plate_library()[f.plate];
-    Plate& p = plates_[f.id];
-    const auto shown = [&](vtkSmartPointer<vtkActor>& actor, const TriMesh& mesh, const RigidTransform& pose) {
-      if (!actor) {
-        actor = make_plate_actor(mesh);
-        actor->SetUserMatrix(vtkNew<vtkMatrix4x4>());
-        renderer_->AddActor(actor);
-      }
-      set_matrix(actor->GetUserMatrix(), pose);
-    };
-    const RigidTransform pose = pose_of(world, f);
-    shown(p.actor, model.mesh, pose);
-    if (!model.moving.triangles.empty()) shown(p.moving, model.moving, pose * RigidTransform{{}, {f.opening_mm, 0, 0}});
-  }
+  plates_.update(world);
   if (readers.dust) {
     if (!dust_) dust_ = std::make_unique<DustView>(renderer_, world.bodies().front().body->bone.frame().spacing_mm.x);
     dust_->update(readers.dust->dust());

@@ -237,7 +237,7 @@ class RehearsalWindow {
     world_view_->highlight(control_.tools().piece());
     const TickRecord tick = now.latest();
     show_instruments(now);
-    tools_->show(control_.tools(), tick);
+    now.look([&](const World& world, SceneReaders&) { tools_->show(control_.tools(), tick, world); });
     control_.wash(keyboard_.held(Command::suck), keyboard_.held(Command::wash));
     note_camera(now);
   }

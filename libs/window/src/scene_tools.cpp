@@ -15,6 +15,7 @@
 #include "osteo/bone/plates.h"
 #include "osteo/bone/world_mesh.h"
 #include "osteo/view/actors.h"
+#include "osteo/view/plate_view.h"
 
 namespace osteo {
 namespace {
@@ -68,9 +69,14 @@ void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
   if (ImGui::Button("Fix it here (Enter)", {-1, 0})) tools.perform(rehearsal);
 }
 
+// Where it should lie on bone.
+void tell_collision(double mm) {
+  if (mm > kPlateCollisionMm) ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%.1f mm deep in bone", mm);
+}
+
 }  // namespace
 
-SceneTools::SceneTools(vtkRenderer* renderer) : renderer_(renderer) {
+SceneTools::SceneTools(vtkRenderer* renderer) : renderer_(renderer), hand_plate_(renderer) {
   plane_data_ = vtkSmartPointer<vtkPolyData>::New();
   plane_ = vtkSmartPointer<vtkActor>::New();
   vtkNew<vtkPolyDataMapper> mapper;
@@ -87,7 +93,6 @@ SceneTools::SceneTools(vtkRenderer* renderer) : renderer_(renderer) {
 
 SceneTools::~SceneTools() {
   renderer_->RemoveActor(plane_);
-  if (plate_actor_) renderer_->RemoveActor(plate_actor_);
 }
 
 void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
@@ -99,11 +104,17 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   }
   if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view);
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
-  if (tools.tool() == Tool::plate) plate_panel(tools, rehearsal);
+  if (tools.tool() == Tool::plate) {
+    plate_panel(tools, rehearsal);
+    tell_collision(hand_in_bone_mm_);
+  }
   std::vector<Fixture> fixtures;
+  std::vector<double> in_bone_mm;
   std::size_t steps = 0;
   rehearsal.look([&](const World& world, SceneReaders&) {
     fixtures = world.fixtures();
+    for (const Fixture& f : fixtures)
+      in_bone_mm.push_back(plate_in_bone_mm(world, plate_library()[f.plate], pose_of(world, f), f.opening_mm));
     steps = world.undo_steps();
   });
   for (const Fixture& f : fixtures) {
@@ -112,6 +123,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     ImGui::Text("%u: %s", f.id, model.name.c_str());
     ImGui::SameLine();
     if (ImGui::SmallButton("take off")) rehearsal.act(SceneAction::detach(f.id));
+    tell_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
     if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
       float opening = static_cast<float>(f.opening_mm);
       if (ImGui::SliderFloat("open", &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))
@@ -123,7 +135,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
 }
 
-void SceneTools::show(const HandTools& tools, const TickRecord& tick) {
+void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world) {
   const SawCut& cut = tools.cut();
   plane_->SetVisibility(tools.tool() == Tool::saw ? 1 : 0);
   if (tools.tool() == Tool::saw) {
@@ -147,20 +159,12 @@ void SceneTools::show(const HandTools& tools, const TickRecord& tick) {
     plane_data_->Modified();
   }
   const bool plate = (tick.flags & kPlateInHand) != 0;
-  if (plate && plate_shown_ != tools.plate()) {
-    if (plate_actor_) renderer_->RemoveActor(plate_actor_);
-    const PlateModel& model = plate_library()[tools.plate()];
-    TriMesh mesh = model.mesh;
-    append(mesh, model.moving);
-    plate_actor_ = make_plate_actor(mesh);
-    plate_actor_->SetUserMatrix(vtkNew<vtkMatrix4x4>());
-    renderer_->AddActor(plate_actor_);
-    plate_shown_ = tools.plate();
-  }
-  if (!plate_actor_) return;
-  plate_actor_->SetVisibility(plate ? 1 : 0);
-  set_matrix(plate_actor_->GetUserMatrix(), plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
-                                                       normalized(from_floats(tick.device.axis)), tools.plate_grip()));
+  hand_in_bone_mm_ = 0;
+  if (!plate) return hand_plate_.hide_in_hand();
+  const RigidTransform pose = plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+                                         normalized(from_floats(tick.device.axis)), tools.plate_grip());
+  hand_plate_.show_in_hand(world, static_cast<std::uint32_t>(tools.plate()), pose);
+  hand_in_bone_mm_ = plate_in_bone_mm(world, plate_library()[tools.plate()], pose);
 }
 
 }  // namespace osteo

@@ -3,6 +3,7 @@
 #include <vtkSmartPointer.h>
 
 #include "hand_tools.h"
+#include "osteo/view/plate_view.h"
 
 class vtkActor;
 class vtkPolyData;
@@ -20,13 +21,14 @@ class SceneTools {
   /// A section of the panel.
   void panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view);
   /// Cursors of the tools, before each frame.
-  void show(const HandTools& tools, const TickRecord& tick);
+  void show(const HandTools& tools, const TickRecord& tick, const World& world);
 
  private:
   vtkRenderer* renderer_;
-  vtkSmartPointer<vtkActor> plane_, plate_actor_;
+  vtkSmartPointer<vtkActor> plane_;
   vtkSmartPointer<vtkPolyData> plane_data_;
-  std::optional<std::size_t> plate_shown_;
+  PlateView hand_plate_;
+  double hand_in_bone_mm_ = 0;
 };
 
 }  // namespace osteo

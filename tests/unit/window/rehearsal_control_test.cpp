@@ -210,6 +210,32 @@ TEST(RehearsalControl, SuckerAndWaterGoWithTheirKeys) {
   EXPECT_EQ(session.ticks.back().device.pedal, 0);
 }
 
+TEST(RehearsalControl, TheSecondHandTakesTheNextInstrumentAndPutsItAway) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  control.wash(false, false);
+  EXPECT_TRUE(control.second_hand_empty());
+  for (const InstrumentKind kind : {InstrumentKind::sucker, InstrumentKind::irrigator, InstrumentKind::probe}) {
+    press(control, Command::second_hand);
+    EXPECT_NE(control.message().find("second hand"), std::string::npos);
+    const auto holds = [&] {
+      control.wash(false, false);
+      return instrument_of(control.rehearsal().latest(1).device.tool).kind == kind;
+    };
+    EXPECT_TRUE(frames_until(control, holds)) << static_cast<int>(kind);
+    EXPECT_FALSE(control.second_hand_empty());
+    EXPECT_EQ(control.rehearsal().latest(1).device.pedal, 0) << "it is held ready";
+  }
+  press(control, Command::second_hand);
+  control.wash(false, false);
+  EXPECT_TRUE(control.second_hand_empty());
+  control.wash(true, false);
+  EXPECT_FALSE(control.second_hand_empty()) << "the sucker comes while it is asked for";
+  sitting.running->stop();
+}
+
 TEST(RehearsalControl, SavesGoesOnAndBeginsAnew) {
   Sitting sitting;
   RehearsalControl control = sitting.control();

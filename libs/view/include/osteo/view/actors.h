@@ -24,8 +24,6 @@ inline constexpr double kBoneAmbient = 0.16;
 void set_bone_wetness(vtkProperty* bone, double share);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
-/// Metal: plates and screws.
-[[nodiscard]] vtkSmartPointer<vtkActor> make_plate_actor(const TriMesh& mesh);
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);
 /// Dark blue background; the lamp of a microscope, at the eyes and a little above and to the left, so that what lies deep is lit and relief
 /// still shows; a weak fill from the other side. On bone of any colour no highlight burns out: at most 250 of 255.

@@ -12,6 +12,7 @@
 #include "osteo/scene/soft_body.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/dust_view.h"
+#include "osteo/view/plate_view.h"
 
 namespace osteo {
 
@@ -53,16 +54,13 @@ class WorldView {
   void wake(bool coarse);
   void make_coarse();
   void take_coarse();
-  struct Plate {
-    vtkSmartPointer<vtkActor> actor, moving;
-  };
   vtkRenderer* renderer_;
   const StructureMap* structures_;
   vtkSmartPointer<vtkActor> soft_actor_;
   vtkSmartPointer<vtkPolyData> soft_data_;
   std::uint64_t soft_version_ = 0;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
-  std::map<std::uint32_t, Plate> plates_;
+  PlateView plates_;
   std::unique_ptr<DustView> dust_;
   std::vector<double> camera_;  // and poses, when last looked at
   std::chrono::steady_clock::time_point since_{};
