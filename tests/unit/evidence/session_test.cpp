@@ -129,7 +129,7 @@ TEST(Sessions, UndoTakesBackWhatWasRemoved) {
   record(scratch / "back.oss", 1, {at(990, SceneAction::plain(ActionKind::undo))});
   const Procedure p = parse_procedure(kProcedure, "t.json");
   const Score all = score(scratch / "all.oss", &p), back = score(scratch / "back.oss", &p);
-  EXPECT_GT(value(all.values, "cavity_mm3"), 0);
+  EXPECT_FALSE(says(all, "nothing was removed"));
   EXPECT_EQ(value(back.values, "cavity_mm3"), 0);
   EXPECT_GT(value(back.values, "removed_mm3"), 0);  // work was done all the same
   EXPECT_TRUE(says(back, "nothing was removed"));
@@ -215,11 +215,18 @@ TEST(Sessions, HardCasesHaveAWordEach) {
   EXPECT_EQ(find(idle.values, "strokes")->word, "no burr drilled");
   EXPECT_NEAR(value(idle.values, "idle_s"), 2, 0.11);
   // Inside a structure from the beginning.
-  RehearsalOptions inside = options(scratch / "inside.oss");
-  Script in;
-  in.waypoints = {{0, {0, 0, 1}, false}, {0.3, {0, 0, 1}, false}};
-  Rehearsal(block(), std::make_unique<ScriptedDevice>(in, 1000), inside, {}).run_to_end({});
-  EXPECT_TRUE(says(score(scratch / "inside.oss"), "touched from the first tick on"));
+  NearMetric near({1000, rod().get(), nullptr});
+  TickRecord inside;
+  inside.device.position_mm = {0, 0, 1};
+  const World world = block();
+  near.frame({1000, {}, {&inside, 1}, {}, {}, world, nullptr, 0});
+  std::vector<Measured> values;
+  std::vector<Moment> moments;
+  near.finish(world, values, moments);
+  ASSERT_FALSE(moments.empty());
+  EXPECT_EQ(moments.front().what, "touched from the first tick on");
+  EXPECT_EQ(value(values, "touches[rod]"), 1);
+  EXPECT_EQ(value(values, "injured_s[rod]"), 0);  // it did not turn
 }
 
 TEST(Sessions, AReferenceLeavesOutTheSamePerson) {
@@ -234,7 +241,16 @@ TEST(Sessions, AReferenceLeavesOutTheSamePerson) {
   EXPECT_TRUE(says(s, "1 sessions of the reference are left out"));
   // What only the novice took was kept: better than what the novice left.
   EXPECT_GT(value(s.values, "region_log_ratio"), 0);
-  EXPECT_GE(value(s.values, "force_above_band_share[rod]"), 0);
+  // Experts who press harder than anybody, and such who do not press at all.
+  for (const float newtons : {1000.0F, 0.0F}) {
+    auto& theirs = reference.sessions[1].near[1];
+    theirs.assign(200, {0, {}, 1, newtons, newtons});
+    const Score banded = score(scratch / "s1.oss", nullptr, &reference);
+    EXPECT_EQ(value(banded.values, "force_above_band_share[rod]"), newtons > 0 ? 0 : 1);
+    theirs.resize(50);
+    EXPECT_EQ(find(score(scratch / "s1.oss", nullptr, &reference).values, "force_above_band_share[rod]")->word,
+              "experts drilled less than a second near it");
+  }
   const Score novice = score(scratch / "s3.oss", nullptr, &reference, "P3");
   EXPECT_NE(find(novice.values, "region_log_ratio")->word.find("no sessions of novices"), std::string::npos);
 }
