@@ -77,8 +77,10 @@ std::vector<std::uint8_t> cavity_of(const std::vector<std::uint8_t>& solid, cons
     outside[c] = 1;
     return true;
   };
+  const std::vector<float> to_gone = squared_distance_mm2(gone, frame, 1, context);
+  const auto opened = static_cast<float>(Product::kOpenedMm * Product::kOpenedMm);
   const auto enter_inside = [&](std::size_t c) {
-    if (inside[c] != 0 || outside[c] != 0 || d2[c] < least) return false;
+    if (inside[c] != 0 || outside[c] != 0 || d2[c] < least || to_gone[c] > opened) return false;
     inside[c] = 1;
     return true;
   };

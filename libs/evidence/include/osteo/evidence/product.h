@@ -26,7 +26,7 @@ struct RemovedVoxel {
 /// to be opened, and all that nothing else led to).
 class Product {
  public:
-  static constexpr double kBallMm = 0.5, kAroundMm = 5, kCoarsestMm = 0.5;
+  static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;
   static constexpr std::size_t kMostCells = 24'000'000;
 
   /// `before`, `after`: World; the structures must outlive this. O(cells).
