@@ -146,6 +146,12 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     });
   };
   draw("before.png");
+  // A script that says from where it is looked at tells the session, as the window does.
+  if (script.camera) {
+    const Vec3 eye_mm = view.centre_mm + view.eye * (view.radius_mm / 0.24);
+    const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
+    rehearsal.note("camera", Json{{"eye_mm", triple(eye_mm)}, {"target_mm", triple(view.centre_mm)}, {"view_angle_deg", 30}}.dump());
+  }
   RehearsalSummary s;
   if (p.fast) {
     s = rehearsal.run_to_end(io.context);

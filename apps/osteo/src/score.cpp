@@ -80,7 +80,8 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   }
   if (!io.common.quiet) {
     const auto s = [](double x) { return format_number(std::round(x * 100) / 100) + " s"; };
-    io.err << "scored in " << s(score.seconds_frames + score.seconds_product) << ", " << s(score.seconds_product) << " of it for the end product\n";
+    io.err << "scored in " << s(score.seconds_frames + score.seconds_product) << ", " << s(score.seconds_product)
+           << " of it for the end product\n";
   }
   return session.outline().damaged() ? static_cast<int>(ExitCode::corrupt) : 0;
 }

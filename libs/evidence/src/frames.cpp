@@ -169,7 +169,8 @@ std::vector<CameraPose> cameras_of(const SessionReader& session, std::size_t& un
 
 World tell_frames(const SessionReader& session, World begin, const FrameMaker::Sink& sink, const Context& context) {
   if (begin.hash() != session.header().bone_hash)
-    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's", "give the case it was recorded on, unchanged");
+    throw Error(ExitCode::corrupt, "the session was recorded on another bone than this case's",
+                "give the case it was recorded on, unchanged");
   std::size_t unreadable = 0;
   const std::vector<CameraPose> cameras = cameras_of(session, unreadable);
   if (unreadable > 0) context.warn(std::to_string(unreadable) + " camera notes cannot be read: left out");

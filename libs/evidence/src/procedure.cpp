@@ -15,17 +15,28 @@ using Keys = std::vector<std::string>;
 // What an item of each kind goes by, besides name, kind, threshold and spread.
 Keys keys_of(ItemKind kind) {
   switch (kind) {
-    case ItemKind::exposed: return {"structure", "towards", "within_deg", "cover_mm"};
-    case ItemKind::not_violated: return {"structure"};
-    case ItemKind::no_hole: return {"structure", "towards", "within_deg"};
-    case ItemKind::no_cells_left: return {"structure", "cells", "within_mm"};
-    case ItemKind::no_overhang: return {"structure", "towards", "within_deg", "within_mm"};
-    case ItemKind::thinned: return {"structure", "towards", "within_deg", "most"};
-    case ItemKind::sharp_angle: return {"structure", "second", "within_mm"};
-    case ItemKind::followed: return {"structure", "cover_mm"};
-    case ItemKind::margin: return {"curve_mm", "most"};
-    case ItemKind::pieces: return {"most"};
-    case ItemKind::fixed: return {};
+    case ItemKind::exposed:
+      return {"structure", "towards", "within_deg", "cover_mm"};
+    case ItemKind::not_violated:
+      return {"structure"};
+    case ItemKind::no_hole:
+      return {"structure", "towards", "within_deg"};
+    case ItemKind::no_cells_left:
+      return {"structure", "cells", "within_mm"};
+    case ItemKind::no_overhang:
+      return {"structure", "towards", "within_deg", "within_mm"};
+    case ItemKind::thinned:
+      return {"structure", "towards", "within_deg", "most"};
+    case ItemKind::sharp_angle:
+      return {"structure", "second", "within_mm"};
+    case ItemKind::followed:
+      return {"structure", "cover_mm"};
+    case ItemKind::margin:
+      return {"curve_mm", "most"};
+    case ItemKind::pieces:
+      return {"most"};
+    case ItemKind::fixed:
+      return {};
   }
   return {};
 }
@@ -37,8 +48,8 @@ class Reading {
   Procedure read() {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_procedure");
-    const Keys known{"osteotome_procedure", "$schema", "name",         "about", "usual_s", "structures",
-                     "regions",             "instruments", "force_limits", "items", "steps"};
+    const Keys known{"osteotome_procedure", "$schema",      "name",  "about", "usual_s", "structures", "regions",
+                     "instruments",         "force_limits", "items", "steps"};
     file_.allow(root, "", known);
     out_.name = file_.text(file_.need(root, "", "name"), "name");
     if (const JsonValue* v = root.find("about")) out_.about = file_.text(*v, "about");
@@ -68,7 +79,8 @@ class Reading {
   // "item 3 ('sinus shown')": the name where there is one.
   static std::string called(const std::string& what, std::size_t n, const JsonValue& v) {
     std::string where = what + " " + std::to_string(n + 1);
-    if (const JsonValue* const name = v.find("name"); name != nullptr && name->kind == JsonValue::Kind::text) where += " ('" + name->text + "')";
+    if (const JsonValue* const name = v.find("name"); name != nullptr && name->kind == JsonValue::Kind::text)
+      where += " ('" + name->text + "')";
     return where;
   }
   template <class T>
@@ -178,29 +190,51 @@ Procedure mirrored(Procedure p) {
 // Starting values, to be fitted on rated cases: docs/evidence.md says where they are from.
 double usual_threshold(ItemKind kind) {
   switch (kind) {
-    case ItemKind::exposed: return 0.6;
-    case ItemKind::no_hole: return 1;
-    case ItemKind::no_cells_left: return 0.05;
-    case ItemKind::no_overhang: return 0.95;
-    case ItemKind::thinned: return 1.5;
-    case ItemKind::sharp_angle: return 2;
-    case ItemKind::followed: return 0.7;
-    case ItemKind::margin: return 2;
-    case ItemKind::pieces: return 2;
-    case ItemKind::fixed: return 1;
-    case ItemKind::not_violated: return 0;
+    case ItemKind::exposed:
+      return 0.6;
+    case ItemKind::no_hole:
+      return 1;
+    case ItemKind::no_cells_left:
+      return 0.05;
+    case ItemKind::no_overhang:
+      return 0.95;
+    case ItemKind::thinned:
+      return 1.5;
+    case ItemKind::sharp_angle:
+      return 2;
+    case ItemKind::followed:
+      return 0.7;
+    case ItemKind::margin:
+      return 2;
+    case ItemKind::pieces:
+      return 2;
+    case ItemKind::fixed:
+      return 1;
+    case ItemKind::not_violated:
+      return 0;
   }
   return 0;
 }
 
 double usual_spread(ItemKind kind) {
   switch (kind) {
-    case ItemKind::exposed: case ItemKind::followed: return 0.15;
-    case ItemKind::no_hole: return 0.5;
-    case ItemKind::no_cells_left: case ItemKind::no_overhang: return 0.05;
-    case ItemKind::thinned: case ItemKind::sharp_angle: case ItemKind::margin: return 0.5;
-    case ItemKind::pieces: case ItemKind::fixed: return 1;
-    case ItemKind::not_violated: return 0.1;
+    case ItemKind::exposed:
+    case ItemKind::followed:
+      return 0.15;
+    case ItemKind::no_hole:
+      return 0.5;
+    case ItemKind::no_cells_left:
+    case ItemKind::no_overhang:
+      return 0.05;
+    case ItemKind::thinned:
+    case ItemKind::sharp_angle:
+    case ItemKind::margin:
+      return 0.5;
+    case ItemKind::pieces:
+    case ItemKind::fixed:
+      return 1;
+    case ItemKind::not_violated:
+      return 0.1;
   }
   return 1;
 }

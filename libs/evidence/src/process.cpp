@@ -95,8 +95,8 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
     }
     if (t.hand == 0) strokes_.add(t_s, at);
   }
-  volume_at_.emplace_back(f.ticks.empty() ? (volume_at_.empty() ? 0 : volume_at_.back().first) : seconds(f.ticks.back().tick + 1, f.rate_hz),
-                          removed_mm3_);
+  volume_at_.emplace_back(
+      f.ticks.empty() ? (volume_at_.empty() ? 0 : volume_at_.back().first) : seconds(f.ticks.back().tick + 1, f.rate_hz), removed_mm3_);
   // A frame is still when in no tick of it a hand moves faster than 2 mm/s, and no pedal is down.
   if (!pedal && moved_mm * f.rate_hz < kStillMmPerS) {
     still_ += ticks;

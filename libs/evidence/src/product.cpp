@@ -42,43 +42,86 @@ void fill_solid(const World& world, const Frame& frame, std::vector<std::uint8_t
   }
 }
 
-// What a ball of kBallMm reaches from the lattice's faces, swept.
-std::vector<std::uint8_t> reach(const std::vector<std::uint8_t>& solid, const Frame& frame, const Context& context) {
-  const std::size_t n = cells_of(frame);
+// From cell to cell by faces, as far as `enter` lets.
+void walk(const std::array<int, 3>& dims, std::vector<std::uint32_t>& queue, const auto& enter) {
+  const auto nx = static_cast<std::size_t>(dims[0]), ny = static_cast<std::size_t>(dims[1]), nz = static_cast<std::size_t>(dims[2]);
+  const auto visit = [&](std::size_t c) {
+    if (enter(c)) queue.push_back(static_cast<std::uint32_t>(c));
+  };
+  for (std::size_t q = 0; q < queue.size(); ++q) {
+    const std::size_t c = queue[q], i = c % nx, j = c / nx % ny, k = c / (nx * ny);
+    if (i > 0) visit(c - 1);
+    if (i + 1 < nx) visit(c + 1);
+    if (j > 0) visit(c - nx);
+    if (j + 1 < ny) visit(c + nx);
+    if (k > 0) visit(c - nx * ny);
+    if (k + 1 < nz) visit(c + nx * ny);
+  }
+}
+
+// What a ball of kBallMm reaches from the lattice's faces by way of bone that is gone. `solid`: as it is left; `gone`: bone that was;
+// `closed`: spaces that were closed, into which no way leads but through bone that is gone.
+std::vector<std::uint8_t> cavity_of(const std::vector<std::uint8_t>& solid, const std::vector<std::uint8_t>& gone,
+                                    const std::vector<std::uint8_t>& closed, const Frame& frame, const Context& context) {
+  const std::size_t n = frame.voxel_count();
   const double h = frame.spacing_mm.x;
+  const std::array<int, 3> dims = frame.dims;
   const std::vector<float> d2 = squared_distance_mm2(solid, frame, 1, context);
   // Distances are between centres: the solid begins half a cell nearer.
   const auto least = static_cast<float>(std::pow(Product::kBallMm + h / 2, 2) * (1 - 1e-6));
-  std::vector<std::uint8_t> centre(n, 0);
+  // Outside first: all that is reached without what is gone or was closed.
+  std::vector<std::uint8_t> outside(n, 0), inside(n, 0);
   std::vector<std::uint32_t> queue;
-  const std::array<int, 3> dims = frame.dims;
-  const auto at = [&](int i, int j, int k) { return (static_cast<std::size_t>(k) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(dims[0]) + static_cast<std::size_t>(i); };
-  const auto visit = [&](std::size_t c) {
-    if (centre[c] != 0 || d2[c] < least) return;
-    centre[c] = 1;
-    queue.push_back(static_cast<std::uint32_t>(c));
+  const auto enter_outside = [&](std::size_t c) {
+    if (outside[c] != 0 || d2[c] < least || gone[c] != 0 || closed[c] != 0) return false;
+    outside[c] = 1;
+    return true;
   };
-  for (int k = 0; k < dims[2]; ++k)
-    for (int j = 0; j < dims[1]; ++j)
-      for (int i = 0; i < dims[0]; ++i) {
-        if (i == 0 || j == 0 || k == 0 || i == dims[0] - 1 || j == dims[1] - 1 || k == dims[2] - 1) visit(at(i, j, k));
-      }
-  for (std::size_t q = 0; q < queue.size(); ++q) {
-    const std::size_t c = queue[q];
-    const int i = static_cast<int>(c % static_cast<std::size_t>(dims[0])), j = static_cast<int>(c / static_cast<std::size_t>(dims[0]) % static_cast<std::size_t>(dims[1])),
-              k = static_cast<int>(c / (static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1])));
-    if (i > 0) visit(c - 1);
-    if (i + 1 < dims[0]) visit(c + 1);
-    if (j > 0) visit(at(i, j - 1, k));
-    if (j + 1 < dims[1]) visit(at(i, j + 1, k));
-    if (k > 0) visit(at(i, j, k - 1));
-    if (k + 1 < dims[2]) visit(at(i, j, k + 1));
+  const std::vector<float> to_gone = squared_distance_mm2(gone, frame, 1, context);
+  const auto opened = static_cast<float>(Product::kOpenedMm * Product::kOpenedMm);
+  const auto enter_inside = [&](std::size_t c) {
+    if (inside[c] != 0 || outside[c] != 0 || d2[c] < least || to_gone[c] > opened) return false;
+    inside[c] = 1;
+    return true;
+  };
+  const auto nx = static_cast<std::size_t>(dims[0]), ny = static_cast<std::size_t>(dims[1]), nz = static_cast<std::size_t>(dims[2]);
+  std::vector<std::uint32_t> at_face;  // bone that is gone, at the lattice's own face
+  for (std::size_t c = 0; c < n; ++c) {
+    const std::size_t i = c % nx, j = c / nx % ny, k = c / (nx * ny);
+    if (i != 0 && j != 0 && k != 0 && i != nx - 1 && j != ny - 1 && k != nz - 1) continue;
+    if (enter_outside(c)) queue.push_back(static_cast<std::uint32_t>(c));
+    if (gone[c] != 0) at_face.push_back(static_cast<std::uint32_t>(c));
   }
+  walk(dims, queue, enter_outside);
+  // From there into what is gone, and on wherever the ball fits.
+  std::vector<std::uint32_t> inner;
+  for (const std::uint32_t c : at_face) {
+    if (enter_inside(c)) inner.push_back(c);
+  }
+  const auto step_in = [&](std::size_t c) { return gone[c] != 0 && enter_inside(c); };
+  for (const std::uint32_t c : queue) {
+    const std::size_t i = c % nx, j = c / nx % ny, k = c / (nx * ny);
+    const auto look = [&](std::size_t to) {
+      if (step_in(to)) inner.push_back(static_cast<std::uint32_t>(to));
+    };
+    if (i > 0) look(c - 1);
+    if (i + 1 < nx) look(c + 1);
+    if (j > 0) look(c - nx);
+    if (j + 1 < ny) look(c + nx);
+    if (k > 0) look(c - nx * ny);
+    if (k + 1 < nz) look(c + nx * ny);
+  }
+  walk(dims, inner, enter_inside);
+  if (inner.empty()) return inside;
   // The ball sweeps what lies within its radius (and half a cell: faces, not centres) of its centre's ways.
-  const std::vector<float> swept = squared_distance_mm2(centre, frame, 1, context);
+  const std::vector<float> swept = squared_distance_mm2(inside, frame, 1, context),
+                           beside = squared_distance_mm2(outside, frame, 1, context);
   const auto most = static_cast<float>(std::pow(Product::kBallMm + h / 2, 2) * (1 + 1e-6));
-  for (std::size_t c = 0; c < n; ++c) centre[c] = swept[c] < most && solid[c] == 0 ? 1 : 0;
-  return centre;
+  for (std::size_t c = 0; c < n; ++c) {
+    const bool was_outside = gone[c] == 0 && closed[c] == 0 && beside[c] < most;
+    inside[c] = swept[c] < most && solid[c] == 0 && !was_outside ? 1 : 0;
+  }
+  return inside;
 }
 
 }  // namespace
@@ -86,7 +129,10 @@ std::vector<std::uint8_t> reach(const std::vector<std::uint8_t>& solid, const Fr
 Product::Product(const World& before, const World& after, const StructureMap& structures, const Procedure& procedure,
                  std::vector<RemovedVoxel> removed, const Context& context)
     : after_world_(after), structures_(structures), procedure_(procedure), removed_(std::move(removed)) {
-  std::tie(face_, face_of_) = structures_.surface();
+  for (std::size_t n = 0; n < structures_.values().size(); ++n) {
+    append(face_, structures_.face(n));
+    face_of_.resize(face_.points_mm.size(), structures_.values()[n]);
+  }
   for (std::size_t p = 0; p < face_.points_mm.size(); ++p) {
     Box& box = boxes_[face_of_[p]];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -109,7 +155,7 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   };
   for (const RemovedVoxel& v : removed_) take(v.own_mm);
   for (std::size_t p = 0; p < face_.points_mm.size(); ++p) {
-    if (const ProcedureStructure* const s = procedure_.find(structures_.name_of(face_of_[p])); s != nullptr && s->role != ProcedureRole::enter)
+    if (const ProcedureStructure* const s = procedure_.find(structures_.name_of(face_of_[p])); s != nullptr)
       take(from_floats(face_.points_mm[p]));
   }
   if (lo.x > hi.x) take(bone.centre_mm());
@@ -140,32 +186,31 @@ Product::Product(const World& before, const World& after, const StructureMap& st
   before_.assign(n, 0);
   after_.assign(n, 0);
   label_.assign(n, 0);
+  nearest_mm_.assign(n, 0);
   fill_solid(before, frame_, before_, context);
   fill_solid(after, frame_, after_, context);
   std::array<bool, 256> blocks{};
   for (const std::uint8_t v : structures_.values()) {
     const ProcedureStructure* const s = procedure_.find(structures_.name_of(v));
-    blocks[v] = s == nullptr || s->role != ProcedureRole::enter;
     // What the procedure does not name, and is a space, is not known to be one: it ends a cavity.
+    blocks[v] = s == nullptr || s->role != ProcedureRole::enter;
   }
   const auto nx = static_cast<std::size_t>(frame_.dims[0]);
   parallel_for(n / nx, 64, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin * nx; c < end * nx; ++c) {
       const StructureMap::Answer a = structures_.at(place(c));
       if (a.structure != 0 && a.distance_mm < 0) label_[c] = a.structure;
+      nearest_mm_[c] = static_cast<float>(a.distance_mm);
     }
   });
-  std::vector<std::uint8_t> solid(n);
-  for (std::size_t c = 0; c < n; ++c) solid[c] = before_[c] != 0 || blocks[label_[c]] ? 1 : 0;
-  const std::vector<std::uint8_t> could = reach(solid, frame_, context);
-  for (std::size_t c = 0; c < n; ++c) solid[c] = after_[c] != 0 || blocks[label_[c]] ? 1 : 0;
-  reached_ = reach(solid, frame_, context);
-  cavity_.resize(n);
-  bool any = false;
+  std::vector<std::uint8_t> solid(n), gone(n), closed(n);
   for (std::size_t c = 0; c < n; ++c) {
-    cavity_[c] = reached_[c] != 0 && could[c] == 0 ? 1 : 0;
-    any |= cavity_[c] != 0;
+    solid[c] = after_[c] != 0 || blocks[label_[c]] ? 1 : 0;
+    gone[c] = before_[c] != 0 && after_[c] == 0 ? 1 : 0;
+    closed[c] = label_[c] != 0 && !blocks[label_[c]] ? 1 : 0;
   }
+  cavity_ = cavity_of(solid, gone, closed, frame_, context);
+  const bool any = std::find(cavity_.begin(), cavity_.end(), 1) != cavity_.end();
   if (any) {
     to_cavity_mm_ = squared_distance_mm2(cavity_, frame_, 1, context);
     for (float& d : to_cavity_mm_) d = std::sqrt(d);
@@ -199,8 +244,11 @@ double Product::sample(const std::vector<float>& field, Vec3 own_mm) const {
   }
   float d[8];
   for (int c = 0; c < 8; ++c) {
-    const int i = std::min(lo[0] + (c & 1), frame_.dims[0] - 1), j = std::min(lo[1] + (c >> 1 & 1), frame_.dims[1] - 1), k = std::min(lo[2] + (c >> 2), frame_.dims[2] - 1);
-    d[c] = field[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame_.dims[1]) + static_cast<std::size_t>(j)) * static_cast<std::size_t>(frame_.dims[0]) + static_cast<std::size_t>(i)];
+    const int i = std::min(lo[0] + (c & 1), frame_.dims[0] - 1), j = std::min(lo[1] + (c >> 1 & 1), frame_.dims[1] - 1),
+              k = std::min(lo[2] + (c >> 2), frame_.dims[2] - 1);
+    d[c] = field[(static_cast<std::size_t>(k) * static_cast<std::size_t>(frame_.dims[1]) + static_cast<std::size_t>(j)) *
+                     static_cast<std::size_t>(frame_.dims[0]) +
+                 static_cast<std::size_t>(i)];
   }
   return static_cast<double>(mix_linear(d, u[0], u[1], u[2]));
 }
@@ -332,8 +380,7 @@ void Product::cells_left(const ScaleItem& item, std::uint8_t s, Result& r) const
   for (std::size_t c = 0; c < label_.size(); ++c) {
     if (label_[c] != cells || distance_to(s, place(c)) > item.within_mm) continue;
     ++all;
-    // Neither reached by the ball nor taken out together with what is around it.
-    if (reached_[c] != 0) continue;
+    if (cavity_[c] != 0) continue;
     ++left;
     keep(r, place(c));
   }
@@ -364,7 +411,7 @@ void Product::overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Res
   // At rest: seen through the lattice, half a cell a step.
   const double h = frame_.spacing_mm.x;
   const auto open = [&](Vec3 from, Vec3 way) {
-    for (double t = h; ; t += h / 2) {
+    for (double t = h;; t += h / 2) {
       const std::size_t c = cell(from + way * t);
       if (c == cells_of(frame_)) return true;
       if (after_[c] != 0) return false;
@@ -375,10 +422,11 @@ void Product::overhang(const ScaleItem& item, std::uint8_t s, Vec3 approach, Res
   for (std::size_t c = nxy; c + nxy < cavity_.size(); ++c) {
     if (cavity_[c] == 0) continue;
     // Of the cavity the cells at its wall.
-    const bool wall = after_[c - 1] != 0 || after_[c + 1] != 0 || after_[c - nx] != 0 || after_[c + nx] != 0 || after_[c - nxy] != 0 || after_[c + nxy] != 0;
+    const bool wall = after_[c - 1] != 0 || after_[c + 1] != 0 || after_[c - nx] != 0 || after_[c + nx] != 0 || after_[c - nxy] != 0 ||
+                      after_[c + nxy] != 0;
     if (!wall) continue;
     const Vec3 at = place(c);
-    if (distance_to(s, at) > item.within_mm) continue;
+    if (static_cast<double>(nearest_mm_[c]) > item.within_mm || distance_to(s, at) > item.within_mm) continue;
     ++all;
     if (std::any_of(views.begin(), views.end(), [&](Vec3 w) { return open(at, w); })) {
       ++seen;
@@ -436,7 +484,7 @@ void Product::sharp(const ScaleItem& item, std::uint8_t s, Result& r) const {
   Vec3 where;
   bool any = false;
   for (std::size_t c = 0; c < after_.size(); ++c) {
-    if (after_[c] == 0 || static_cast<double>(d2[c]) <= r.value * r.value) continue;
+    if (after_[c] == 0 || static_cast<double>(d2[c]) <= r.value * r.value || static_cast<double>(nearest_mm_[c]) > item.within_mm) continue;
     const Vec3 at = place(c);
     if (distance_to(s, at) > item.within_mm || distance_to(other, at) > item.within_mm) continue;
     r.value = std::sqrt(static_cast<double>(d2[c]));
@@ -519,7 +567,7 @@ void Product::followed(const ScaleItem& item, std::uint8_t s, Result& r) const {
 }
 
 // The cavity reaches a landmark curve: everywhere near it, nowhere far beyond. Value: the farthest that the curve is from it.
-void Product::margin(const ScaleItem& item, Result& r) const {
+void Product::margin(const ScaleItem& item, Vec3 approach, Result& r) const {
   if (to_cavity_mm_.empty()) {
     r.word = "nothing was opened";
     return;
@@ -537,8 +585,8 @@ void Product::margin(const ScaleItem& item, Result& r) const {
     const double d = cell(p) == cells_of(frame_) ? 1e9 : cavity_distance_mm(p);
     r.value = std::max(r.value, d);
     if (d > item.threshold) keep(r, p);
-    // Beyond: on the way on from the cavity's middle across the curve.
-    const Vec3 out = normalized(p - middle);
+    // Beyond: on the way on from the cavity's middle across the curve, at right angles to the approach.
+    const Vec3 out = normalized(p - middle - approach * dot(p - middle, approach));
     for (double t = 0; t <= 20; t += frame_.spacing_mm.x / 2) {
       const std::size_t c = cell(p + out * t);
       if (c == cells_of(frame_)) break;
@@ -563,7 +611,9 @@ Product::Result Product::count(const ScaleItem& item, const World& world) {
   }
   r.measured = true;
   r.pass = r.value >= item.threshold && (item.kind == ItemKind::fixed || r.value <= item.most);
-  r.margin = (item.kind == ItemKind::fixed ? r.value - item.threshold + 1 : std::min(r.value - item.threshold + 1, item.most - r.value + 1)) / item.spread;
+  r.margin =
+      (item.kind == ItemKind::fixed ? r.value - item.threshold + 1 : std::min(r.value - item.threshold + 1, item.most - r.value + 1)) /
+      item.spread;
   if (!r.pass) r.margin = std::min(r.margin, 0.0) - 1;
   return r;
 }
@@ -574,15 +624,30 @@ Product::Result Product::evaluate(const ScaleItem& item, Vec3 approach, const st
   r.threshold = item.threshold;
   const double h = frame_.spacing_mm.x;
   switch (item.kind) {
-    case ItemKind::not_violated: case ItemKind::no_cells_left: r.evidence_each = h * h * h; break;
-    case ItemKind::no_overhang: r.evidence_each = h * h; break;
-    default: break;
+    case ItemKind::not_violated:
+    case ItemKind::no_cells_left:
+      r.evidence_each = h * h * h;
+      break;
+    case ItemKind::no_overhang:
+      r.evidence_each = h * h;
+      break;
+    default:
+      break;
   }
   switch (item.kind) {
-    case ItemKind::not_violated: r.unit = "mm3"; break;
-    case ItemKind::no_hole: r.unit = "mm2"; break;
-    case ItemKind::thinned: case ItemKind::sharp_angle: case ItemKind::margin: r.unit = "mm"; break;
-    default: r.unit = "1";
+    case ItemKind::not_violated:
+      r.unit = "mm3";
+      break;
+    case ItemKind::no_hole:
+      r.unit = "mm2";
+      break;
+    case ItemKind::thinned:
+    case ItemKind::sharp_angle:
+    case ItemKind::margin:
+      r.unit = "mm";
+      break;
+    default:
+      r.unit = "1";
   }
   std::uint8_t s = 0;
   if (!item.structure.empty() && !value_of(item.structure, s)) {
@@ -590,16 +655,36 @@ Product::Result Product::evaluate(const ScaleItem& item, Vec3 approach, const st
     return r;
   }
   switch (item.kind) {
-    case ItemKind::exposed: exposed(item, s, r); break;
-    case ItemKind::not_violated: violated(item, s, injured, r); break;
-    case ItemKind::no_hole: hole(item, s, r); break;
-    case ItemKind::no_cells_left: cells_left(item, s, r); break;
-    case ItemKind::no_overhang: overhang(item, s, approach, r); break;
-    case ItemKind::thinned: thinned(item, s, r); break;
-    case ItemKind::sharp_angle: sharp(item, s, r); break;
-    case ItemKind::followed: followed(item, s, r); break;
-    case ItemKind::margin: margin(item, r); break;
-    case ItemKind::pieces: case ItemKind::fixed: return count(item, after_world_);
+    case ItemKind::exposed:
+      exposed(item, s, r);
+      break;
+    case ItemKind::not_violated:
+      violated(item, s, injured, r);
+      break;
+    case ItemKind::no_hole:
+      hole(item, s, r);
+      break;
+    case ItemKind::no_cells_left:
+      cells_left(item, s, r);
+      break;
+    case ItemKind::no_overhang:
+      overhang(item, s, approach, r);
+      break;
+    case ItemKind::thinned:
+      thinned(item, s, r);
+      break;
+    case ItemKind::sharp_angle:
+      sharp(item, s, r);
+      break;
+    case ItemKind::followed:
+      followed(item, s, r);
+      break;
+    case ItemKind::margin:
+      margin(item, approach, r);
+      break;
+    case ItemKind::pieces:
+    case ItemKind::fixed:
+      return count(item, after_world_);
   }
   return r;
 }
@@ -613,7 +698,7 @@ std::vector<Product::RegionResult> Product::regions() const {
     std::uint8_t s = 0;
     if (!value_of(g.structure, s)) continue;
     for (std::size_t c = 0; c < before_.size(); ++c) {
-      if (before_[c] == 0 || distance_to(s, place(c)) > g.within_mm) continue;
+      if (before_[c] == 0 || static_cast<double>(nearest_mm_[c]) > g.within_mm || distance_to(s, place(c)) > g.within_mm) continue;
       r.bone_mm3 += cell_mm3;
       if (after_[c] == 0) r.removed_mm3 += cell_mm3;
     }

@@ -101,7 +101,8 @@ IsotonicQuantile::IsotonicQuantile(std::span<const Point> points, double q) {
 double IsotonicQuantile::at(double distance_mm) const {
   if (steps_.empty()) return 0;
   const double step = std::floor(distance_mm / kStepMm) * kStepMm;
-  const auto behind = std::upper_bound(steps_.begin(), steps_.end(), step + kStepMm / 2, [](double d, const Point& p) { return d < p.distance_mm; });
+  const auto behind =
+      std::upper_bound(steps_.begin(), steps_.end(), step + kStepMm / 2, [](double d, const Point& p) { return d < p.distance_mm; });
   return behind == steps_.begin() ? steps_.front().value : (behind - 1)->value;
 }
 

@@ -108,12 +108,14 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
     if (o.group == ReferenceGroup::expert) others.push_back(&o);
   }
   const std::size_t left_out = reference->sessions.size() - experts.size() - novices.size();
-  if (left_out > 0) score.words.push_back(std::to_string(left_out) + " sessions of the reference are left out: of the same person, or the same session");
+  if (left_out > 0)
+    score.words.push_back(std::to_string(left_out) + " sessions of the reference are left out: of the same person, or the same session");
   const auto no = [&](const auto& names, const std::string& why) {
     for (const char* const n : names) score.values.push_back(not_measured(n, why));
   };
   if (experts.empty() || novices.empty()) {
-    no(kRegion, std::string("the reference has no sessions of ") + (experts.empty() ? "experts" : "novices") + (left_out > 0 ? " by others" : ""));
+    no(kRegion,
+       std::string("the reference has no sessions of ") + (experts.empty() ? "experts" : "novices") + (left_out > 0 ? " by others" : ""));
   } else {
     const RegionScore r = score_region(mine, experts, novices);
     score.values.push_back(measured("region_log_ratio", r.log_ratio));
@@ -216,16 +218,19 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   double t = now_s();
   ScoreKeeper keeper({session.header().rate_hz, structures, procedure});
   const World first = begin.copy();
-  const World end = tell_frames(session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context.sub(0, 0.8));
+  const World end = tell_frames(
+      session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context.sub(0, 0.8));
   keeper.finish(end);
   score.seconds_frames = now_s() - t;
   score.values = keeper.values();
   score.moments = keeper.moments();
   if (keeper.removed().empty()) score.words.push_back("nothing was removed");
-  if (first.bodies().size() > 1 || end.bodies().size() > 1) score.words.push_back("bone in pieces: the end product is measured with each where it lay at the beginning");
+  if (first.bodies().size() > 1 || end.bodies().size() > 1)
+    score.words.push_back("bone in pieces: the end product is measured with each where it lay at the beginning");
   if (structures == nullptr && procedure == nullptr) score.words.push_back("the case has no structures: nothing is known of what was near");
   for (const Moment& m : score.moments) {
-    if (m.what == "touched from the first tick on") score.words.push_back("'" + m.structure + "' was touched from the first tick on: the tool began inside it");
+    if (m.what == "touched from the first tick on")
+      score.words.push_back("'" + m.structure + "' was touched from the first tick on: the tool began inside it");
   }
   t = now_s();
   if (procedure != nullptr) {
@@ -259,7 +264,8 @@ Reference::One read_reference(const SessionReader& session, World begin, const S
                               const Context& context) {
   Reference::One one{which.subject, which.group, {}, {}};
   ScoreKeeper keeper({session.header().rate_hz, structures, nullptr});
-  const World end = tell_frames(session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context);
+  const World end = tell_frames(
+      session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context);
   keeper.finish(end);
   one.removed = keeper.removed_set();
   one.near = keeper.near().samples();

@@ -45,7 +45,7 @@ Json score_json(const Score& score, bool evidence) {
   j["metrics"] = Json::list();
   for (const Measured& m : score.values) {
     Json v{{"name", m.row->name}, {"of", m.of.empty() ? Json() : Json(m.of)}, {"value", m.value ? Json(*m.value) : Json()},
-           {"unit", m.row->unit}, {"better", name_of(m.row->better)},       {"source", m.row->source}};
+           {"unit", m.row->unit}, {"better", name_of(m.row->better)},         {"source", m.row->source}};
     if (!m.word.empty()) v["word"] = m.word;
     j["metrics"].push_back(std::move(v));
   }
@@ -54,7 +54,8 @@ Json score_json(const Score& score, bool evidence) {
     j["items_judged"] = score.judged();
     j["items"] = Json::list();
     for (const Product::Result& r : score.items) {
-      Json i{{"name", r.item->name}, {"kind", kind_of(*r.item)}, {"structure", r.item->structure.empty() ? Json() : Json(r.item->structure)}};
+      Json i{
+          {"name", r.item->name}, {"kind", kind_of(*r.item)}, {"structure", r.item->structure.empty() ? Json() : Json(r.item->structure)}};
       i["value"] = r.measured ? Json(r.value) : Json();
       i["threshold"] = r.threshold;
       i["unit"] = r.unit;
@@ -78,8 +79,12 @@ Json score_json(const Score& score, bool evidence) {
   }
   j["moments"] = Json::list();
   for (const Moment& m : score.moments) {
-    j["moments"].push_back({{"t_s", m.t_s},         {"at_mm", place(m.at_mm)}, {"what", m.what}, {"structure", m.structure.empty() ? Json() : Json(m.structure)},
-                            {"value", m.value},     {"limit", m.limit}});
+    j["moments"].push_back({{"t_s", m.t_s},
+                            {"at_mm", place(m.at_mm)},
+                            {"what", m.what},
+                            {"structure", m.structure.empty() ? Json() : Json(m.structure)},
+                            {"value", m.value},
+                            {"limit", m.limit}});
   }
   if (evidence) {
     j["hidden"] = Json::list();
@@ -118,7 +123,8 @@ std::string score_lines(const Score& score) {
     const std::string unit = r.unit == "1" || r.unit.empty() ? "" : " " + r.unit;
     out += padded(std::string(!r.measured ? "  ?    " : r.pass ? "  pass " : "  fail ") + r.item->name, 44) + " ";
     if (r.measured) {
-      out += short_number(r.value) + unit + " (" + kind_of(*r.item) + ", threshold " + short_number(r.threshold) + ", margin " + short_number(r.margin) + ")";
+      out += short_number(r.value) + unit + " (" + kind_of(*r.item) + ", threshold " + short_number(r.threshold) + ", margin " +
+             short_number(r.margin) + ")";
       if (!r.word.empty()) out += "; " + r.word;
     } else {
       out += "not judged: " + r.word;
@@ -132,8 +138,8 @@ std::string score_lines(const Score& score) {
 std::string metric_table_markdown() {
   std::string out = "| metric | unit | better | needs | what | source |\n|---|---|---|---|---|---|\n";
   for (const MetricRow& r : metric_table()) {
-    out += "| `" + std::string(r.name) + "` | " + std::string(r.unit) + " | " + std::string(name_of(r.better)) + " | " + std::string(r.needs) + " | " +
-           std::string(r.help) + " | " + std::string(r.source) + " |\n";
+    out += "| `" + std::string(r.name) + "` | " + std::string(r.unit) + " | " + std::string(name_of(r.better)) + " | " +
+           std::string(r.needs) + " | " + std::string(r.help) + " | " + std::string(r.source) + " |\n";
   }
   return out;
 }

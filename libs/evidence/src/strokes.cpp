@@ -32,14 +32,21 @@ void StrokeFinder::end_period() {
   std::size_t begin = 0;
   const auto put = [&](std::size_t end) {
     Stroke s{period_[begin].t_s, period_[end].t_s, 0, {}};
-    for (std::size_t i = begin; i < end; ++i) s.length_mm += length(period_[i + 1].at_mm - period_[i].at_mm);
+    // In steps that are more than the trembling of a resting hand.
+    for (std::size_t i = begin + 1, from = begin; i <= end; ++i) {
+      const double step = length(period_[i].at_mm - period_[from].at_mm);
+      if (step < kStillMm) continue;
+      s.length_mm += step;
+      from = i;
+    }
     s.direction = normalized(period_[end].at_mm - period_[begin].at_mm);
     if (s.length_mm >= kLeastMm && s.end_s - s.begin_s >= kLeastS - 1e-9) strokes_.push_back(s);
     begin = end;
   };
   for (std::size_t i = kReach; i + kReach < n; ++i) {
     if (turn[i] <= kTurnDeg) continue;
-    const auto from = turn.begin() + static_cast<std::ptrdiff_t>(i - kReach), to = turn.begin() + static_cast<std::ptrdiff_t>(i + kReach + 1);
+    const auto from = turn.begin() + static_cast<std::ptrdiff_t>(i - kReach),
+               to = turn.begin() + static_cast<std::ptrdiff_t>(i + kReach + 1);
     if (std::max_element(from, to) == turn.begin() + static_cast<std::ptrdiff_t>(i)) put(i);  // of equals the first
   }
   if (n > 1) put(n - 1);

@@ -135,7 +135,8 @@ void VisibilityMetric::frame(const EvidenceFrame& f) {
     const Instrument& tool = instrument_of(t.device.tool);
     const Head h{from_floats(t.device.position_mm), normalized(from_floats(t.device.axis)), tool.head, t.device.tool};
     // Heads nearly where the one before was add nothing.
-    if (!heads.empty() && heads.back().tool == h.tool && length(heads.back().at_mm - h.at_mm) < 0.02 && dot(heads.back().axis, h.axis) > 0.9999)
+    if (!heads.empty() && heads.back().tool == h.tool && length(heads.back().at_mm - h.at_mm) < 0.02 &&
+        dot(heads.back().axis, h.axis) > 0.9999)
       continue;
     heads.push_back(h);
   }

@@ -6,6 +6,8 @@
 #include <filesystem>
 
 #include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/evidence/score.h"
 
 namespace osteo {
 namespace {
@@ -21,7 +23,8 @@ std::string wrong(const std::string& json) {
 }
 
 std::string with(const std::string& rest) {
-  return "{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": \"never_touch\"} ],\n" + rest + " }";
+  return "{ \"osteotome_procedure\": 1, \"name\": \"n\",\n\"structures\": [ {\"name\": \"nerve\", \"role\": \"never_touch\"} ],\n" + rest +
+         " }";
 }
 
 TEST(Procedures, ThoseOfTheProjectAreRead) {
@@ -44,19 +47,32 @@ TEST(Procedures, ErrorsNameFileItemAndLine) {
   EXPECT_NE(unknown.find("'p.json' line 4"), std::string::npos) << unknown;
   EXPECT_NE(unknown.find("item 1 ('a')"), std::string::npos) << unknown;
   EXPECT_NE(unknown.find("did you mean 'nerve'?"), std::string::npos) << unknown;
-  const std::string idle = wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"not_violated\", \"structure\": \"nerve\",\n\"cover_mm\": 1} ]"));
+  const std::string idle =
+      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"not_violated\", \"structure\": \"nerve\",\n\"cover_mm\": 1} ]"));
   EXPECT_NE(idle.find("line 4"), std::string::npos) << idle;
   EXPECT_NE(idle.find("'cover_mm' says nothing for an item of kind 'not_violated'"), std::string::npos) << idle;
   EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"exposed\"} ]")).find("'structure' is missing"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"shown\", \"structure\": \"nerve\"} ]")).find("exposed"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"pieces\"}, {\"name\": \"a\", \"kind\": \"fixed\"} ]")).find("two of this name"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"nerve\", \"threshold\": -1} ]")).find("threshold"), std::string::npos);
+  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"shown\", \"structure\": \"nerve\"} ]")).find("exposed"),
+            std::string::npos);
+  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"pieces\"}, {\"name\": \"a\", \"kind\": \"fixed\"} ]"))
+                .find("two of this name"),
+            std::string::npos);
+  EXPECT_NE(
+      wrong(with("\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"nerve\", \"threshold\": -1} ]")).find("threshold"),
+      std::string::npos);
   EXPECT_NE(wrong(with("\"steps\": [ {\"name\": \"s\", \"items\": [\"b\"]} ]")).find("'b' is no item"), std::string::npos);
   EXPECT_NE(wrong(with("\"force_limits\": [ {\"structure\": \"nerve\", \"within_mm\": 1} ]")).find("most_n"), std::string::npos);
-  EXPECT_NE(wrong(with("\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"bone\"} ]")).find("'bone' is not among"), std::string::npos);
+  EXPECT_NE(wrong(with("\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"bone\"} ]")).find("'bone' is not among"),
+            std::string::npos);
   EXPECT_NE(wrong("{ \"name\": \"n\" }").find("osteotome_procedure"), std::string::npos);
   EXPECT_NE(wrong(with("\"item\": []")).find("item"), std::string::npos);
-  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"m\", \"kind\": \"margin\", \"curve_mm\": [[0,0,0]]} ]")).find("two points"), std::string::npos);
+  EXPECT_NE(wrong(with("\"items\": [ {\"name\": \"m\", \"kind\": \"margin\", \"curve_mm\": [[0,0,0]]} ]")).find("two points"),
+            std::string::npos);
+}
+
+TEST(Metrics, TheTableInTheDocsIsTheirDeclaration) {
+  const std::string docs = read_text(std::filesystem::path(OSTEO_SOURCE) / "docs/evidence.md");
+  EXPECT_NE(docs.find(metric_table_markdown()), std::string::npos) << metric_table_markdown();
 }
 
 }  // namespace

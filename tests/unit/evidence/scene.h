@@ -9,15 +9,15 @@
 
 namespace osteo::test {
 
-// Bone where `inside` is positive (mm from the face, as a signed distance), voxels of h, in a cube of `size_mm` around the origin; `shift` moves
-// the lattice, not the bone.
+// Bone where `inside` is positive (mm from the face, as a signed distance), voxels of h, in a cube of `size_mm` around the origin; `shift`
+// moves the lattice, not the bone.
 inline World solid_world(const std::function<double(Vec3)>& inside, double h, double size_mm, Vec3 shift = {}, double turn = 0) {
   Frame f;
   const int n = static_cast<int>(std::ceil(size_mm / h / 8)) * 8;
   f.dims = {n, n, n};
   f.spacing_mm = {h, h, h};
   f.direction = rotation_about({}, normalized({1, 2, 3}), turn).rotation;
-  f.origin_mm = f.direction * (Vec3{1, 1, 1} * (-n * h / 2)) + shift;
+  f.origin_mm = f.direction * (Vec3{1, 1, 1} * ((1 - n) * h / 2)) + shift;  // faces at multiples of h
   std::vector<Ijk> bricks;
   for (int k = 0; k < n / 8; ++k)
     for (int j = 0; j < n / 8; ++j)
@@ -33,7 +33,8 @@ inline World solid_world(const std::function<double(Vec3)>& inside, double h, do
 }
 
 // `value_of` says which structure a point lies in.
-inline StructureMap structure_map(const std::function<std::uint8_t(Vec3)>& value_of, std::vector<Structure> structures, double h, double size_mm) {
+inline StructureMap structure_map(const std::function<std::uint8_t(Vec3)>& value_of, std::vector<Structure> structures, double h,
+                                  double size_mm) {
   Labels l;
   const int n = static_cast<int>(std::ceil(size_mm / h));
   l.frame.dims = {n, n, n};

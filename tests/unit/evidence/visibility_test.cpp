@@ -35,7 +35,8 @@ bool by_every_voxel(const World& world, Vec3 from, Vec3 to, const BoneSight::Lef
     const BrickGrid& bone = b.body->bone;
     const RigidTransform back = b.world_from_body.inverse();
     for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
-      if (bone.value(v) >= kSolid && passes(bone.frame(), bone.coordinate(v), back(from), back(to)) && !(left_out && left_out(b, v))) return true;
+      if (bone.value(v) >= kSolid && passes(bone.frame(), bone.coordinate(v), back(from), back(to)) && !(left_out && left_out(b, v)))
+        return true;
     }
   }
   return false;
@@ -56,7 +57,8 @@ TEST(Visibility, ARayIsAsEveryVoxelsBoxSays) {
     const BoneSight sight(world);
     int blocked = 0;
     for (int n = 0; n < 150; ++n) {
-      const Vec3 from{u(random) * 9, u(random) * 9, u(random) * 9}, to = normalized({u(random), u(random), u(random)}) * (5 + 60 * std::abs(u(random)));
+      const Vec3 from{u(random) * 9, u(random) * 9, u(random) * 9},
+          to = normalized({u(random), u(random), u(random)}) * (5 + 60 * std::abs(u(random)));
       const BoneSight::LeftOut out = n % 2 == 0 ? BoneSight::LeftOut() : [](const PlacedBody&, VoxelKey v) { return v % 3 == 0; };
       const bool is = sight.blocked(from, to, out);
       ASSERT_EQ(is, by_every_voxel(world, from, to, out)) << n << ' ' << turn;
@@ -115,7 +117,8 @@ TEST_F(Drilled, WhatLiesUnderARoofIsHidden) {
   const std::size_t open = metric.voxels().size();
   take(metric, {-6, 0, -0.2}, 20, &above);
   const std::size_t all = metric.voxels().size();
-  for (const auto& [name, v] : metric.voxels()) EXPECT_EQ(v.seen, v.own_mm.x > 0 ? VisibilityMetric::Seen::seen : VisibilityMetric::Seen::hidden);
+  for (const auto& [name, v] : metric.voxels())
+    EXPECT_EQ(v.seen, v.own_mm.x > 0 ? VisibilityMetric::Seen::seen : VisibilityMetric::Seen::hidden);
   std::vector<Measured> values;
   std::vector<Moment> moments;
   metric.finish(world_, values, moments);

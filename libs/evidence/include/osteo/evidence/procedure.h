@@ -24,11 +24,24 @@ struct EnumNames<ProcedureRole> {
 };
 
 /// What an item of the scale asks of the end product. What each computes: docs/evidence.md, and the fields of ScaleItem.
-enum class ItemKind : int { exposed, not_violated, no_hole, no_cells_left, no_overhang, thinned, sharp_angle, followed, margin, pieces, fixed };
+enum class ItemKind : int {
+  exposed,
+  not_violated,
+  no_hole,
+  no_cells_left,
+  no_overhang,
+  thinned,
+  sharp_angle,
+  followed,
+  margin,
+  pieces,
+  fixed
+};
 template <>
 struct EnumNames<ItemKind> {
-  static constexpr std::array<std::string_view, 11> values{"exposed", "not_violated", "no_hole",  "no_cells_left", "no_overhang", "thinned",
-                                                           "sharp_angle", "followed", "margin", "pieces", "fixed"};
+  static constexpr std::array<std::string_view, 11> values{"exposed",     "not_violated", "no_hole",     "no_cells_left",
+                                                           "no_overhang", "thinned",      "sharp_angle", "followed",
+                                                           "margin",      "pieces",       "fixed"};
 };
 
 struct ProcedureStructure {

@@ -22,9 +22,11 @@ struct RemovedVoxel {
 /// mm. The lattice: cubes of the bone's voxel, of 0.5 mm where that is larger, around all that was removed and all structures named, with
 /// 5 mm around; more than kMostCells cubes make it coarser, which it says (`word`).
 /// Solid: density of at least a half, between voxels linear. Structures but those to be opened are solid too: a cavity ends at them.
+/// Cavity: what a ball of kBallMm reaches from the lattice's faces through bone that is gone, and on through spaces that were closed (those
+/// to be opened, and all that nothing else led to).
 class Product {
  public:
-  static constexpr double kBallMm = 0.5, kAroundMm = 5, kCoarsestMm = 0.5;
+  static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;
   static constexpr std::size_t kMostCells = 24'000'000;
 
   /// `before`, `after`: World; the structures must outlive this. O(cells).
@@ -41,8 +43,8 @@ class Product {
     std::size_t evidence_count = 0;  ///< of all
     double evidence_each = 0;        ///< mm2 or mm3 that one place stands for
   };
-  /// `approach`: unit, from the bone to who drills, in the first body's frame: the middle of the cone of views of no_overhang; zero where it
-  /// is not known. `injured`: names of structures that a turning burr reached.
+  /// `approach`: unit, from the bone to who drills, in the first body's frame: the middle of the cone of views of no_overhang; zero where
+  /// it is not known. `injured`: names of structures that a turning burr reached.
   [[nodiscard]] Result evaluate(const ScaleItem& item, Vec3 approach, const std::vector<std::string>& injured) const;
 
   /// Of an item that asks for no more than pieces and plates.
@@ -82,7 +84,7 @@ class Product {
   void thinned(const ScaleItem& item, std::uint8_t s, Result& r) const;
   void sharp(const ScaleItem& item, std::uint8_t s, Result& r) const;
   void followed(const ScaleItem& item, std::uint8_t s, Result& r) const;
-  void margin(const ScaleItem& item, Result& r) const;
+  void margin(const ScaleItem& item, Vec3 approach, Result& r) const;
 
   struct Box {
     Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
@@ -92,9 +94,10 @@ class Product {
   const Procedure& procedure_;
   std::vector<RemovedVoxel> removed_;
   Frame frame_;
-  std::vector<std::uint8_t> before_, after_, label_, cavity_, reached_;  // bone; structure inside which a cell lies; flags
-  std::vector<float> to_cavity_mm_;  // from centre to centre
-  std::array<Box, 256> boxes_;  // around each structure's face, by value
+  std::vector<std::uint8_t> before_, after_, label_, cavity_;  // bone; structure inside which a cell lies; flag
+  std::vector<float> nearest_mm_;                              // to the nearest structure of all
+  std::vector<float> to_cavity_mm_;                            // from centre to centre
+  std::array<Box, 256> boxes_;                                 // around each structure's face, by value
   TriMesh face_;
   std::vector<std::uint8_t> face_of_;
   std::string word_;

@@ -29,8 +29,8 @@ struct ReferenceSession {
     visit({"group", "how good", "", 0, 0, true}, p.group);
   }
 };
-/// FOLDER/reference.json: {"osteotome_reference": 1, "sessions": [{"session", "subject", "group"}, ...]}. Strict, with line. Errors: no_input,
-/// usage.
+/// FOLDER/reference.json: {"osteotome_reference": 1, "sessions": [{"session", "subject", "group"}, ...]}. Strict, with line. Errors:
+/// no_input, usage.
 [[nodiscard]] std::vector<ReferenceSession> load_reference(const std::filesystem::path& folder);
 
 /// Which voxels a session took, ascending names.

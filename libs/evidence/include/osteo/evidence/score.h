@@ -57,22 +57,22 @@ class ScoreKeeper {
 };
 
 struct Score {
-  std::string procedure;  ///< its name; empty: none
+  std::string procedure;           ///< its name; empty: none
   std::vector<std::string> words;  ///< what limits it, each a sentence
   std::vector<Measured> values;
   std::vector<Product::Result> items;
   std::vector<Moment> moments;
-  std::vector<std::pair<std::string, std::string>> steps;  ///< name, "done", "not done" or "not judged"
+  std::vector<std::pair<std::string, std::string>> steps;            ///< name, "done", "not done" or "not judged"
   std::vector<std::pair<VoxelKey, VisibilityMetric::Voxel>> hidden;  ///< what was removed unseen
-  double seconds_frames = 0, seconds_product = 0;  ///< it took; not in the JSON
+  double seconds_frames = 0, seconds_product = 0;                    ///< it took; not in the JSON
 
   [[nodiscard]] std::size_t passed() const;
   [[nodiscard]] std::size_t judged() const;
 };
 
-/// All of it. `procedure` may be null; `structures` may be null; `subject`: sessions of the reference by this one are left out (as is one that
-/// removed exactly the same voxels). Errors: corrupt (another bone), usage (a procedure that needs structures which the case does not have:
-/// says which; unless none of its structures is there, that is the procedure of another case).
+/// All of it. `procedure` may be null; `structures` may be null; `subject`: sessions of the reference by this one are left out (as is one
+/// that removed exactly the same voxels). Errors: corrupt (another bone), usage (a procedure that needs structures which the case does not
+/// have: says which; unless none of its structures is there, that is the procedure of another case).
 [[nodiscard]] Score score_session(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
                                   const Reference* reference, const std::string& subject, const Context& context = {});
 /// A session of a reference, read. The bone has to be the same.

@@ -8,9 +8,9 @@
 
 namespace osteo {
 
-/// Makes the same frames as the session's file will have, and keeps the score of them: what it tells after end() is what `osteo score` tells of
-/// the file, to the bit, where it joined before the first tick and nothing was lost. Takes a copy of the bone. After ticks were lost it goes
-/// on from the scene as it is.
+/// Makes the same frames as the session's file will have, and keeps the score of them: what it tells after end() is what `osteo score`
+/// tells of the file, to the bit, where it joined before the first tick and nothing was lost. Takes a copy of the bone. After ticks were
+/// lost it goes on from the scene as it is.
 class ScoreReader final : public Reader {
  public:
   /// What `scene` refers to must outlive this.

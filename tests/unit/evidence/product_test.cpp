@@ -1,0 +1,210 @@
+// The primitives of the end product against bodies whose answer is known, and under shift, turn and resampling.
+#include "osteo/evidence/product.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "osteo/evidence/visibility.h"
+#include "osteo/grid/brick_places.h"
+#include "scene.h"
+
+namespace osteo {
+namespace {
+
+// Bone below z = 8; in it a ball of radius 3 around the origin (1), and a tube along y at x = -8 of radius 1.2 (2).
+double block(Vec3 p) {
+  return std::min({8 - p.z, 13 - std::abs(p.x), 13 - std::abs(p.y), p.z + 9});
+}
+std::uint8_t structure_at(Vec3 p) {
+  if (length(p) < 3) return 1;
+  return std::hypot(p.x + 8, p.z) < 1.2 && std::abs(p.y) < 8 ? 2 : 0;
+}
+const StructureMap& structures() {
+  static const StructureMap map = test::structure_map(structure_at, {{1, "ball", {}}, {2, "tube", {}}}, 0.4, 30);
+  return map;
+}
+Procedure procedure(const std::string& items) {
+  return parse_procedure(
+      "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"ball\""
+      ", \"role\": \"expose\"},"
+      "{\"name\": \"tube\", \"role\": \"keep\"} ], \"regions\": [ {\"name\": \"shell\", \"kind\": \"target\", \"structure\": \"ball\", "
+      "\"within_mm\": 2},"
+      "{\"name\": \"about the tube\", \"kind\": \"forbidden\", \"structure\": \"tube\", \"within_mm\": 1} ], \"items\": [" +
+          items + "] }",
+      "t.json");
+}
+
+struct Case {
+  World before, after;
+  std::vector<RemovedVoxel> removed;
+};
+// `kept`: bone as it is left.
+Case drilled(const std::function<double(Vec3)>& kept, double h = 0.5, Vec3 shift = {}, double turn = 0) {
+  Case c{test::solid_world(block, h, 34, shift, turn),
+         test::solid_world([&](Vec3 p) { return std::min(block(p), kept(p)); }, h, 34, shift, turn),
+         {}};
+  const BrickGrid &a = c.before.bodies().front().body->bone, &b = c.after.bodies().front().body->bone;
+  for (VoxelKey v = 0; v < a.brick_count() * BrickGrid::kVoxels; ++v) {
+    if (a.value(v) >= kSolid && b.value(v) < kSolid) c.removed.push_back({place_of_voxel_mm(a, v), static_cast<float>(h * h * h)});
+  }
+  return c;
+}
+// A shaft from above, its floor at `floor` and its radius `r` around (x, 0).
+std::function<double(Vec3)> shaft(double floor, double r, double x = 0) {
+  return [=](Vec3 p) { return std::max(floor - p.z, std::hypot(p.x - x, p.y) - r); };
+}
+Product::Result judge(const Case& c, const Procedure& p, Vec3 approach = {0, 0, 1}, const std::vector<std::string>& injured = {}) {
+  const Product product(c.before, c.after, structures(), p, c.removed);
+  return product.evaluate(p.items.front(), approach, injured);
+}
+
+// From a flat floor at height f the ball's face is within c where z >= f - c: a cap.
+TEST(Product, ExposedIsTheCapThatTheFloorComesNearTo) {
+  for (const double cover : {1.0, 1.5}) {
+    const Procedure p = procedure(
+        "{\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"ball\", \"towards\": [0, 0, 1], \"within_deg\": 90, \"cover_mm\": " +
+        std::to_string(cover) + "}");
+    const auto r = judge(drilled(shaft(3.5, 6)), p);
+    ASSERT_TRUE(r.measured);
+    // Of the upper half sphere the share by area is its height over the radius.
+    EXPECT_NEAR(r.value, (3 - (3.5 - cover)) / 3, 0.07) << cover;
+    EXPECT_GT(r.evidence_count, 0U);
+    EXPECT_NEAR(r.margin, (r.value - 0.6) / 0.15, 1e-9);
+    for (const Vec3 e : r.evidence_mm) EXPECT_GT(e.z, 3.5 - cover - 0.5);
+  }
+  const Procedure p = procedure("{\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"ball\"}");
+  EXPECT_DOUBLE_EQ(judge(drilled([](Vec3) { return 1e3; }), p).value, 0);
+}
+
+TEST(Product, StableUnderShiftTurnAndResampling) {
+  const Procedure p = procedure(
+      "{\"name\": \"shown\", \"kind\": \"exposed\", \"structure\": \"ball\", \"towards\": [0, 0, 1], \"within_deg\": 90, \"cover_mm\": 1}");
+  const auto whole = judge(drilled(shaft(3.2, 6)), p);
+  for (const auto& c :
+       {drilled(shaft(3.2, 6), 0.5, {0.17, 0.23, 0.11}), drilled(shaft(3.2, 6), 0.5, {}, 0.35), drilled(shaft(3.2, 6), 0.25)}) {
+    const auto r = judge(c, p);
+    EXPECT_NEAR(r.value, whole.value, 0.12);
+    EXPECT_EQ(r.pass, whole.pass);
+  }
+}
+
+TEST(Product, NotViolatedCountsWhatIsGoneInside) {
+  const Procedure p = procedure("{\"name\": \"whole\", \"kind\": \"not_violated\", \"structure\": \"ball\"}");
+  EXPECT_TRUE(judge(drilled(shaft(3.5, 6)), p).pass);
+  const auto cut = judge(drilled(shaft(2, 6)), p);
+  // The cap of height 1.
+  EXPECT_FALSE(cut.pass);
+  const double cap = std::numbers::pi * 1 * 1 * (3 - 1.0 / 3);
+  EXPECT_NEAR(cut.value, cap, 0.25 * cap);
+  EXPECT_EQ(cut.evidence_count, cut.evidence_mm.size());
+  for (const Vec3 e : cut.evidence_mm) EXPECT_LT(length(e), 3.4);
+  const auto reached = judge(drilled(shaft(3.5, 6)), p, {0, 0, 1}, {"ball"});
+  EXPECT_FALSE(reached.pass);
+  EXPECT_EQ(reached.value, 0);
+  EXPECT_LE(reached.margin, -1);
+}
+
+TEST(Product, AHoleIsAsLargeAsTheBareCap) {
+  const Procedure p = procedure("{\"name\": \"no hole\", \"kind\": \"no_hole\", \"structure\": \"ball\"}");
+  EXPECT_TRUE(judge(drilled(shaft(4.5, 6)), p).pass);
+  const auto r = judge(drilled(shaft(1, 6)), p);
+  EXPECT_FALSE(r.pass);
+  // The cap above z = 1, give or take a cell.
+  EXPECT_NEAR(r.value, 2 * std::numbers::pi * 3 * 2, 2 * std::numbers::pi * 3 * 0.6);
+}
+
+TEST(Product, AWallIsAsThickAsItIs) {
+  const Procedure p = procedure(
+      "{\"name\": \"thin\", \"kind\": \"thinned\", \"structure\": \"tube\", \"towards\": [1, 0, 0], \"within_deg\": 20, \"threshold\": "
+      "2.5, \"most\": 20}");
+  // A trench beside the tube, its face at x = -5: 1.8 mm off.
+  const auto r = judge(drilled([](Vec3 q) { return std::max({-5 - q.x, q.x + 3.5, -2.5 - q.z, std::abs(q.y) - 9}); }), p);
+  ASSERT_TRUE(r.measured);
+  EXPECT_NEAR(r.value, 1.85, 0.3);
+  EXPECT_TRUE(r.pass);
+  EXPECT_EQ(judge(drilled([](Vec3) { return 1e3; }), p).word, "nothing was opened");
+}
+
+TEST(Product, FollowedIsTheShareOfTheTubesLength) {
+  const Procedure p = procedure("{\"name\": \"followed\", \"kind\": \"followed\", \"structure\": \"tube\", \"cover_mm\": 1.5}");
+  // A trench above it for y < 0: half of its way.
+  const auto r = judge(drilled([](Vec3 q) { return std::max({2 - q.z, std::abs(q.x + 8) - 2.5, q.y, -10 - q.y}); }), p);
+  ASSERT_TRUE(r.measured);
+  EXPECT_NEAR(r.value, 0.56, 0.08);  // and a millimetre on, which is still near
+}
+
+TEST(Product, UnderARoofNothingIsSeen) {
+  const Procedure p = procedure("{\"name\": \"open\", \"kind\": \"no_overhang\", \"structure\": \"ball\", \"within_mm\": 3}");
+  EXPECT_GT(judge(drilled(shaft(3.5, 6)), p).value, 0.95);
+  // A shaft beside, and from it a chamber under the roof.
+  const auto under = [](Vec3 q) {
+    const double beside = std::max(3.5 - q.z, std::hypot(q.x - 7, q.y) - 2),
+                 chamber = std::max({3.5 - q.z, q.z - 6, std::abs(q.y) - 3, std::abs(q.x - 3.5) - 4.5});
+    return std::min(beside, chamber);
+  };
+  const auto r = judge(drilled(under), p);
+  ASSERT_TRUE(r.measured);
+  EXPECT_LT(r.value, 0.3);
+  EXPECT_FALSE(r.pass);
+}
+
+TEST(Product, ASharpAngleLeavesNoRoomForABall) {
+  const Procedure p =
+      procedure("{\"name\": \"sharp\", \"kind\": \"sharp_angle\", \"structure\": \"ball\", \"second\": \"tube\", \"within_mm\": 5}");
+  const auto full = judge(drilled([](Vec3) { return 1e3; }), p);
+  const auto thin = judge(drilled([](Vec3 q) { return std::max(std::abs(q.z) > 6 ? 1.0 : -1.0, 1.5 - std::abs(q.y)); }), p);
+  EXPECT_GT(full.value, 3);
+  EXPECT_FALSE(full.pass);
+  EXPECT_NEAR(thin.value, 1.5, 0.4);  // a wall of 3 mm
+  EXPECT_TRUE(thin.pass);
+}
+
+TEST(Product, AMarginIsReachedAndNotPassed) {
+  const auto with = [](double y) {
+    return procedure("{\"name\": \"rim\", \"kind\": \"margin\", \"curve_mm\": [[-1, " + std::to_string(y) + ", 7], [1, " +
+                     std::to_string(y) + ", 7]]}");
+  };
+  const Case c = drilled(shaft(3.5, 6));
+  EXPECT_TRUE(judge(c, with(6.5)).pass);
+  const auto short_of = judge(c, with(10));
+  EXPECT_FALSE(short_of.pass);
+  EXPECT_NEAR(short_of.value, 4, 0.5);
+  const auto beyond = judge(c, with(1.5));
+  EXPECT_FALSE(beyond.pass);
+  EXPECT_LT(beyond.value, 0.5);
+}
+
+TEST(Product, RegionsAndTheCavityHaveTheirVolumes) {
+  const Procedure p = procedure("");
+  const Case c = drilled(shaft(3.5, 6));
+  const Product product(c.before, c.after, structures(), p, c.removed);
+  const auto regions = product.regions();
+  ASSERT_EQ(regions.size(), 2U);
+  // A ball of 5 mm, and of it the cap above 3.5.
+  EXPECT_NEAR(regions[0].bone_mm3, 4.0 / 3 * std::numbers::pi * 125, 0.05 * 523);
+  EXPECT_NEAR(regions[0].removed_mm3, std::numbers::pi * 1.5 * 1.5 * (5 - 0.5), 4);
+  EXPECT_EQ(regions[1].removed_mm3, 0);
+  EXPECT_NEAR(product.outside_targets_mm3(), std::numbers::pi * 36 * 4.5 - regions[0].removed_mm3, 20);
+  EXPECT_NEAR(product.cavity_mm3(), std::numbers::pi * 36 * 4.5, 0.08 * std::numbers::pi * 36 * 4.5);
+}
+
+TEST(Product, ABubbleThatNobodyReachedIsNoCavity) {
+  const Procedure p = procedure("");
+  const Case c = drilled([](Vec3 q) { return length(q - Vec3{6, 6, 0}) - 2; });
+  EXPECT_EQ(Product(c.before, c.after, structures(), p, c.removed).cavity_mm3(), 0);
+}
+
+TEST(Product, WhatTheCaseLacksIsNotJudged) {
+  const Procedure p = parse_procedure(
+      "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"ball\", \"role\": \"expose\"}, {\"name\": \"gone\", "
+      "\"role\": \"keep\"} ],"
+      "\"items\": [ {\"name\": \"a\", \"kind\": \"no_hole\", \"structure\": \"gone\"} ] }",
+      "t.json");
+  const auto r = judge(drilled(shaft(3.5, 6)), p);
+  EXPECT_FALSE(r.measured);
+  EXPECT_EQ(r.word, "the case has no 'gone'");
+}
+
+}  // namespace
+}  // namespace osteo

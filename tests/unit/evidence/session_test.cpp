@@ -1,0 +1,280 @@
+// Whole sessions: live and from the file the same bits, and the hard cases with a word each.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
+#include "osteo/bone/instrument.h"
+#include "osteo/evidence/score.h"
+#include "osteo/scene/rehearsal.h"
+#include "osteo/scene/score_reader.h"
+#include "scene.h"
+#include "scratch.h"
+
+namespace osteo {
+namespace {
+
+// A slab below z = 4, with a rod along y in it (1).
+double slab(Vec3 p) {
+  return std::min({4 - p.z, p.z + 6, 11 - std::abs(p.x), 11 - std::abs(p.y)});
+}
+const std::shared_ptr<const StructureMap>& rod() {
+  static const auto map = std::make_shared<const StructureMap>(test::structure_map(
+      [](Vec3 p) -> std::uint8_t { return std::hypot(p.x, p.z - 1) < 1 && std::abs(p.y) < 8 ? 1 : 0; }, {{1, "rod", {}}}, 0.4, 24));
+  return map;
+}
+World block() {
+  return test::solid_world(slab, 0.5, 24);
+}
+Script holes(int count) {
+  Script s;
+  s.axis = {0, 0.3, 0.95};
+  s.waypoints.push_back({0, {-6, 0, 8}, true});
+  for (int n = 0; n < count; ++n) {
+    const double x = -6 + 4.0 * n;
+    s.waypoints.push_back({n + 0.1, {x, 0, 8}, true});
+    s.waypoints.push_back({n + 0.2, {x, 0, 5.4}, true});
+    s.waypoints.push_back({n + 0.6, {x + 1, 0.5, 4.2}, true});
+    s.waypoints.push_back({n + 0.65, {x, 0, 8}, true});
+  }
+  s.waypoints.push_back({count + 0.0, {-6, 0, 8}, false});
+  return s;
+}
+SceneAction at(std::uint64_t tick, SceneAction a) {
+  a.tick = tick;
+  return a;
+}
+RehearsalOptions options(const std::filesystem::path& file) {
+  RehearsalOptions o;
+  o.session_file = file;
+  o.haptics.device = SpringHand::traits();
+  o.anatomy.structures = rod();
+  o.haptics.structures = rod()->hash();
+  return o;
+}
+const char* const kCamera = "{\"eye_mm\":[0,-20,200],\"target_mm\":[0,0,4],\"up\":[0,1,0],\"view_angle_deg\":30,\"pixels_per_mm\":10}";
+const char* const kProcedure =
+    "{ \"osteotome_procedure\": 1, \"name\": \"t\", \"structures\": [ {\"name\": \"rod\", \"role\": \"keep\"} ],"
+    "\"force_limits\": [ {\"structure\": \"rod\", \"within_mm\": 8, \"most_n\": 0.01} ],"
+    "\"instruments\": [ {\"structure\": \"rod\", \"within_mm\": 8, \"diamond_only\": true} ],"
+    "\"regions\": [ {\"name\": \"r\", \"kind\": \"target\", \"structure\": \"rod\", \"within_mm\": 4} ],"
+    "\"items\": [ {\"name\": \"whole\", \"kind\": \"not_violated\", \"structure\": \"rod\"}, {\"name\": \"one\", \"kind\": \"pieces\", "
+    "\"threshold\": 1, \"most\": 1} ],"
+    "\"steps\": [ {\"name\": \"all\", \"items\": [\"whole\", \"one\"]} ] }";
+
+const Measured* find(const std::vector<Measured>& values, const std::string& name) {
+  for (const Measured& m : values) {
+    if (m.name() == name) return &m;
+  }
+  return nullptr;
+}
+double value(const std::vector<Measured>& values, const std::string& name) {
+  const Measured* const m = find(values, name);
+  EXPECT_NE(m, nullptr) << name;
+  return m == nullptr || !m->value ? -1e9 : *m->value;
+}
+bool says(const Score& s, const std::string& what) {
+  return std::any_of(s.words.begin(), s.words.end(), [&](const std::string& w) { return w.find(what) != std::string::npos; });
+}
+Score score(const std::filesystem::path& file, const Procedure* procedure = nullptr, const Reference* reference = nullptr,
+            const std::string& subject = {}) {
+  return score_session(SessionReader(file, Damage::keep), block(), rod().get(), procedure, reference, subject);
+}
+RehearsalSummary record(const std::filesystem::path& file, int count, std::vector<SceneAction> actions = {}, bool camera = true,
+                        ScoreReader* live = nullptr) {
+  RehearsalOptions o = options(file);
+  o.actions = std::move(actions);
+  Rehearsal r(block(), std::make_unique<ScriptedDevice>(holes(count), 1000), o, {});
+  if (camera) r.note("camera", kCamera);
+  if (live != nullptr) r.add_reader(*live);
+  RehearsalSummary s = r.run_to_end({});
+  if (live != nullptr) {
+    live->end();
+    r.remove_reader(*live);
+  }
+  return s;
+}
+
+TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
+  const test::ScratchFolder scratch;
+  const EvidenceScene scene{1000, rod().get(), nullptr};
+  const World world = block();
+  ScoreReader live(world, scene);
+  live.camera({0, {0, -20, 200}, {0, 0, 4}});
+  const RehearsalSummary s = record(scratch / "s.oss", 3,
+                                    {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5)),
+                                     at(1800, SceneAction::plain(ActionKind::undo)), at(1900, SceneAction::plain(ActionKind::undo))},
+                                    true, &live);
+  const Score file = score(scratch / "s.oss");
+  EXPECT_EQ(live.resyncs(), 0U);
+  ASSERT_GT(live.keeper().values().size(), 20U);
+  for (std::size_t n = 0; n < live.keeper().values().size(); ++n) {
+    const Measured &a = live.keeper().values()[n], &b = file.values[n];
+    EXPECT_EQ(a.name(), b.name());
+    EXPECT_EQ(a.value, b.value) << a.name();  // to the bit
+    EXPECT_EQ(a.word, b.word);
+  }
+  EXPECT_NEAR(value(file.values, "removed_mm3"), s.removed_mm3, 1e-3);
+  EXPECT_NEAR(value(file.values, "sawn_mm3"), s.sawn_mm3, 1e-3);
+  EXPECT_GT(value(file.values, "seen_share"), 0.5);
+  EXPECT_NEAR(value(file.values, "clearance_mm[rod]"), s.structures.at(1).least_clearance_mm, 1e-5);
+  EXPECT_EQ(value(file.values, "touched_s[rod]"), static_cast<double>(s.structures.at(1).ticks_touched) / 1000);
+  EXPECT_EQ(value(file.values, "injured_s[rod]"), static_cast<double>(s.structures.at(1).ticks_injured) / 1000);
+}
+
+TEST(Sessions, UndoTakesBackWhatWasRemoved) {
+  const test::ScratchFolder scratch;
+  record(scratch / "all.oss", 1);
+  record(scratch / "back.oss", 1, {at(990, SceneAction::plain(ActionKind::undo))});
+  const Procedure p = parse_procedure(kProcedure, "t.json");
+  const Score all = score(scratch / "all.oss", &p), back = score(scratch / "back.oss", &p);
+  EXPECT_FALSE(says(all, "nothing was removed"));
+  EXPECT_EQ(value(back.values, "cavity_mm3"), 0);
+  EXPECT_GT(value(back.values, "removed_mm3"), 0);  // work was done all the same
+  EXPECT_TRUE(says(back, "nothing was removed"));
+  EXPECT_EQ(find(back.values, "seen_share")->word, "nothing was removed");
+}
+
+TEST(Sessions, ItemsRulesAndSteps) {
+  const test::ScratchFolder scratch;
+  record(scratch / "s.oss", 2);
+  const Procedure p = parse_procedure(kProcedure, "t.json");
+  const Score s = score(scratch / "s.oss", &p);
+  ASSERT_EQ(s.items.size(), 2U);
+  EXPECT_TRUE(s.items[0].measured);
+  EXPECT_TRUE(s.items[1].pass);
+  EXPECT_GT(value(s.values, "excess_force_ns[rod]"), 0);
+  EXPECT_EQ(value(s.values, "burr_choice_share"), 0);  // a cutting burr where only diamond is allowed
+  EXPECT_EQ(value(s.values, "items_passed"), static_cast<double>(s.passed()));
+  EXPECT_EQ(s.steps.front().second, s.passed() == 2 ? "done" : "not done");
+  EXPECT_NEAR(value(s.values, "rate_mm3_per_s") * value(s.values, "drilling_s"), value(s.values, "removed_mm3"), 1e-9);
+  double phases = 0;
+  for (int n = 1; n <= 5; ++n) phases += value(s.values, "phase_s[fifth " + std::to_string(n) + "]");
+  EXPECT_LE(phases, value(s.values, "duration_s"));
+  const auto json = Json::parse(score_json(s, true).dump());
+  ASSERT_TRUE(json);
+  EXPECT_EQ(*json->find("osteotome_score")->number(), 1);
+  EXPECT_EQ(json->find("items")->items().size(), 2U);
+  const std::string csv = score_csv(s, "s");
+  const auto commas = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
+  const std::size_t end = csv.find('\n');
+  EXPECT_EQ(commas(csv.substr(0, end)), commas(csv.substr(end)));
+}
+
+TEST(Sessions, HardCasesHaveAWordEach) {
+  const test::ScratchFolder scratch;
+  const auto whole = scratch / "whole.oss";
+  record(whole, 2);
+  // Cut short.
+  const auto cut = scratch / "cut.oss";
+  std::filesystem::copy_file(whole, cut);
+  std::filesystem::resize_file(cut, std::filesystem::file_size(whole) * 2 / 3);
+  EXPECT_TRUE(says(score(cut), "cut short"));
+  // A damaged frame in the middle.
+  const auto hurt = scratch / "hurt.oss";
+  std::string bytes = read_text(whole);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
+  write_file(hurt, bytes);
+  const Score damaged = score(hurt);
+  EXPECT_TRUE(says(damaged, "behind the first gap"));
+  EXPECT_LT(value(damaged.values, "duration_s"), value(score(whole).values, "duration_s"));
+  // No camera notes.
+  record(scratch / "blind.oss", 1, {}, false);
+  EXPECT_EQ(find(score(scratch / "blind.oss").values, "seen_share")->word, "the session has no camera notes");
+  // No structures.
+  const Score bare = score_session(SessionReader(whole), block(), nullptr, nullptr, nullptr, {});
+  EXPECT_TRUE(says(bare, "no structures"));
+  EXPECT_EQ(find(bare.values, "touches")->word, "the case has no structures");
+  const Procedure p = parse_procedure(kProcedure, "t.json");
+  const Score half = score_session(SessionReader(whole), block(), nullptr, &p, nullptr, {});
+  EXPECT_EQ(half.items[0].word, "the case has no structures");
+  EXPECT_TRUE(half.items[1].measured);
+  EXPECT_EQ(half.steps.front().second, "not judged");
+  // A procedure for another case.
+  const Procedure other = parse_procedure(
+      "{ \"osteotome_procedure\": 1, \"name\": \"o\", \"structures\": [ {\"name\": \"jaw\", \"role\": \"keep\"} ] }", "o.json");
+  try {
+    static_cast<void>(score(whole, &other));
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::usage);
+    EXPECT_NE(std::string(e.what()).find("'o.json' is a procedure for another case"), std::string::npos);
+    EXPECT_NE(e.advice().find("'rod'"), std::string::npos);
+  }
+  // Another bone.
+  EXPECT_THROW(static_cast<void>(score_session(SessionReader(whole), test::solid_world(slab, 0.6, 24), nullptr, nullptr, nullptr, {})),
+               Error);
+  // Nothing done at all.
+  RehearsalOptions o = options(scratch / "idle.oss");
+  Script still;
+  still.waypoints = {{0, {0, 0, 12}, false}, {2, {0, 0, 12}, false}};
+  Rehearsal(block(), std::make_unique<ScriptedDevice>(still, 1000), o, {}).run_to_end({});
+  const Score idle = score(scratch / "idle.oss", &p);
+  EXPECT_TRUE(says(idle, "nothing was removed"));
+  EXPECT_EQ(find(idle.values, "strokes")->word, "no burr drilled");
+  EXPECT_NEAR(value(idle.values, "idle_s"), 2, 0.11);
+  // Inside a structure from the beginning.
+  NearMetric near({1000, rod().get(), nullptr});
+  TickRecord inside;
+  inside.device.position_mm = {0, 0, 1};
+  const World world = block();
+  near.frame({1000, {}, {&inside, 1}, {}, {}, world, nullptr, 0});
+  std::vector<Measured> values;
+  std::vector<Moment> moments;
+  near.finish(world, values, moments);
+  ASSERT_FALSE(moments.empty());
+  EXPECT_EQ(moments.front().what, "touched from the first tick on");
+  EXPECT_EQ(value(values, "touches[rod]"), 1);
+  EXPECT_EQ(value(values, "injured_s[rod]"), 0);  // it did not turn
+}
+
+TEST(Sessions, AReferenceLeavesOutTheSamePerson) {
+  const test::ScratchFolder scratch;
+  for (int n = 1; n <= 3; ++n) record(scratch / ("s" + std::to_string(n) + ".oss"), n);
+  Reference reference;
+  for (int n = 1; n <= 3; ++n)
+    reference.sessions.push_back(
+        read_reference(SessionReader(scratch / ("s" + std::to_string(n) + ".oss")), block(), rod().get(),
+                       {"s" + std::to_string(n), "P" + std::to_string(n), n == 3 ? ReferenceGroup::novice : ReferenceGroup::expert}));
+  const Score s = score(scratch / "s1.oss", nullptr, &reference);
+  EXPECT_TRUE(says(s, "1 sessions of the reference are left out"));
+  // What only the novice took was kept: better than what the novice left.
+  EXPECT_GT(value(s.values, "region_log_ratio"), 0);
+  // Experts who press harder than anybody, and such who do not press at all.
+  for (const float newtons : {1000.0F, 0.0F}) {
+    auto& theirs = reference.sessions[1].near[1];
+    theirs.assign(200, {0, {}, 1, newtons, newtons});
+    const Score banded = score(scratch / "s1.oss", nullptr, &reference);
+    EXPECT_EQ(value(banded.values, "force_above_band_share[rod]"), newtons > 0 ? 0 : 1);
+    theirs.resize(50);
+    EXPECT_EQ(find(score(scratch / "s1.oss", nullptr, &reference).values, "force_above_band_share[rod]")->word,
+              "experts drilled less than a second near it");
+  }
+  const Score novice = score(scratch / "s3.oss", nullptr, &reference, "P3");
+  EXPECT_NE(find(novice.values, "region_log_ratio")->word.find("no sessions of novices"), std::string::npos);
+}
+
+TEST(Sessions, AReferenceIsReadStrictly) {
+  const test::ScratchFolder scratch;
+  std::filesystem::create_directories(scratch / "a");
+  write_file(scratch / "a/stream.oss", "");
+  const auto wrong = [&](const std::string& text) {
+    write_file(scratch / "reference.json", text);
+    try {
+      static_cast<void>(load_reference(scratch / "."));
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const std::string a = "{\"session\": \"a\", \"subject\": \"P1\", \"group\": \"expert\"}";
+  EXPECT_EQ(wrong("{\"osteotome_reference\": 1, \"sessions\": [" + a + "]}"), "");
+  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [" + a + "," + a + "]}").find("there twice"), std::string::npos);
+  EXPECT_NE(wrong("{\"osteotome_reference\": 1, \"sessions\": [\n{\"session\": \"b\", \"subject\": \"P1\", \"group\": \"expert\"}]}")
+                .find("line 2"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteo
