@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <optional>
+#include <span>
 
 #include "osteo/grid/sampler.h"
 #include "osteo/scene/rehearsal.h"
@@ -21,9 +22,12 @@ class CutsPanel {
   /// Draws the cuts anew at the next frame; otherwise about seven times a second.
   void renew() { age_s_ = 1e9; }
   /// Between ImGui::NewFrame and Render.
-  void draw(Rehearsal& rehearsal, int tool, Box box);
+  void draw(Rehearsal& rehearsal, int tool, Box box) { draw(rehearsal, tool, std::span(&box, 1)); }
+  /// Each cut in a box of its own: axial, coronal, sagittal.
+  void draw(Rehearsal& rehearsal, int tool, const std::array<Box, 3>& boxes) { draw(rehearsal, tool, std::span(boxes)); }
 
  private:
+  void draw(Rehearsal& rehearsal, int tool, std::span<const Box> boxes);
   std::array<unsigned, 3> textures_{};
   std::optional<GridSampler> hu_;
   Vec3 cross_{};

@@ -11,11 +11,16 @@ enum : int {
   kSpace = 32,
   kEscape = 256,
   kEnter = 257,
+  kTab = 258,
   kDown = 264,
   kUp = 265,
   kHome = 268,
   kF1 = 290,
+  kF2 = 291,
   kF5 = 294,
+  kF9 = 298,
+  kF10 = 299,
+  kF11 = 300,
   kKeypadEnter = 335,
 };
 
@@ -57,6 +62,12 @@ constexpr Key kKeys[] = {
     {kF1, Command::help},
     {'H', Command::help},
     {'Q', Command::quit},
+    {kF2, Command::layout},
+    {kF11, Command::full_screen},
+    {kF10, Command::panel_keys},
+    {kTab, Command::wheel},
+    {kF9, Command::ruler},
+    {'W', Command::before},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -74,6 +85,20 @@ const Key* find_key(int code) {
   return at == std::end(kKeys) ? nullptr : at;
 }
 
+std::string key_name(Command command) {
+  static const std::pair<int, const char*> kNames[] = {{kSpace, "Space"}, {kEscape, "Esc"}, {kEnter, "Enter"}, {kTab, "Tab"},
+                                                       {kDown, "Down"},   {kUp, "Up"},      {kHome, "Home"}};
+  for (const Key& key : kKeys) {
+    if (key.command != command) continue;
+    for (const auto& [code, name] : kNames) {
+      if (code == key.code) return name;
+    }
+    if (key.code >= kF1 && key.code < kF1 + 12) return "F" + std::to_string(key.code - kF1 + 1);
+    if (key.code > kSpace && key.code < 127) return {static_cast<char>(key.code)};
+  }
+  return {};
+}
+
 const std::vector<HelpLine>& help_lines() {
   using enum Command;
   static const std::vector<HelpLine> lines = {{"move", "moves the drill across the view", {}},
@@ -86,6 +111,7 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Ctrl-wheel", "nearer and farther", {}},
                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
                                               {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
+                                              {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},
                                               {"V, I", "a sucker, or water, beside the burr", {suck, wash}},
                                               {"X", "saw: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
                                               {"P", "pieces: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
@@ -94,14 +120,20 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Enter", "cut; take apart; fix the plate", {perform}},
                                               {"Z", "takes back the last stroke, cut, move, plate", {undo}},
                                               {"Esc", "back to the drill", {put_away}},
-                                              {"M", "marks this moment in the session", {mark}},
-                                              {"S", "screenshot into the session's folder", {screenshot}},
-                                              {"F5", "save the session and go on", {save}},
-                                              {"R", "save the session, the bone is whole again", {reset}},
+                                              {"W", "the bone as it was at the beginning, and as it is", {before}},
+                                              {"F9", "ruler: two points on the bone, by clicks", {ruler}},
+                                              {"M", "note pinned to the bone under the mouse; without text: marks this moment", {mark}},
+                                              {"S", "screenshot with its caption into the session's folder", {screenshot}},
+                                              {"F5", "saves the session and goes on", {save}},
+                                              {"R", "asks; saves the session, and the bone is whole again", {reset}},
                                               {"Home", "view from the left", {home}},
                                               {"N", "sound on and off", {sound}},
+                                              {"F2", "layout: panel and cuts beside, picture alone, four pictures", {layout}},
+                                              {"F10", "keys move in the panel: arrows, Space; Esc gives them back", {panel_keys}},
+                                              {"F11", "full screen, and back", {full_screen}},
+                                              {"Ctrl +, Ctrl -, Ctrl 0", "size of text and panels; as the monitor has it", {}},
                                               {"F1, H", "shows this, and hides it", {help}},
-                                              {"Q", "save and close", {quit}}};
+                                              {"Q", "saves, ends the session and shows what was done", {quit}}};
   return lines;
 }
 

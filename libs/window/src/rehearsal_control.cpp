@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <new>
 
-#include "osteo/grid/brick_places.h"
 #include "osteo/base/error.h"
+#include "osteo/grid/brick_places.h"
 
 namespace osteo {
 
@@ -71,6 +71,14 @@ void RehearsalControl::reset() {
   if (begin(true, true)) say("the bone is whole again; the session before was saved");
 }
 
+bool RehearsalControl::end() {
+  leading_.reset();
+  const bool saved = guarded([&] { actions_.save(); });
+  if (!saved) lost_ = failure_;
+  ran_ = latched_ = sucking_ = washing_ = false;
+  return saved;
+}
+
 void RehearsalControl::watch() {
   const Rehearsal* const running = actions_.rehearsal();
   if (running == nullptr || failure_) return;
@@ -106,8 +114,8 @@ HandPose RehearsalControl::hand_pose() const {
 }
 
 FreeWays RehearsalControl::free_ways(bool whole_tool) const {
-  ToolSkin skin =
-      plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip()) : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
+  ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
+                                  : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
   std::optional<FreeWays> ways;
   rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
@@ -284,10 +292,6 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       return true;
     case Command::taper:
       take_burr(BurrShape::taper);
-      return true;
-    case Command::mark:
-      rehearsal().note("mark", "{}");
-      say("marked");
       return true;
     case Command::save:
       save();

@@ -4,7 +4,6 @@
 #include <vtk_glew.h>
 
 #include <GLFW/glfw3.h>
-#include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
@@ -28,80 +27,92 @@
 #include <optional>
 #include <utility>
 
+#include "before_view.h"
 #include "camera_notes.h"
 #include "cuts_panel.h"
 #include "gamepad.h"
-#include "help_panel.h"
-#include "open_window.h"
 #include "osteo/base/error.h"
+#include "osteo/bone/world_mesh.h"
 #include "osteo/grid/brick_places.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/offscreen.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
+#include "room.h"
 #include "scene_tools.h"
-#include "settings_panel.h"
-#include "sound_panel.h"
-#include "status_panel.h"
 #include "window_state.h"
 
 namespace osteo {
 namespace {
 
-constexpr int kPanelWidth = 270, kSliceWidth = 290;
 constexpr Vec3 kFromLeft{0.94, -0.25, 0.22};
 
 class RehearsalWindow {
  public:
-  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
-      : control_(actions, options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
+  RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
+                  const WindowActions& actions, SoundOut& sound)
+      : shell_(shell),
+        room_(shell, person),
+        control_(working(actions), options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
         actions_(actions),
         sound_(sound),
         scan_(options.scan),
         approval_(options.approval),
         approval_ended_(options.approval_ended),
         state_file_(options.state_file),
-        device_name_(options.device) {
+        device_name_(options.device),
+        case_hash_(options.case_hash),
+        end_page_(options.end_page),
+        window_(shell.window()) {
     if (hu != nullptr) cuts_.set_hu(*hu);
-    open(options);
+    open();
     make_scene();
     look_from(kFromLeft);
-    show_words("loading the case");
     control_.look_from(view_axes());
     control_.begin(options.from_case, false);
     look_from(kFromLeft);
   }
 
   ~RehearsalWindow() {
-    glfwMakeContextCurrent(window_);
+    shell_.on_key = nullptr;
+    // The session is the caller's to save, and goes on until then.
+    if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && work_) rehearsal->remove_reader(*work_);
     cuts_.release();
     tools_.reset();
+    before_view_.reset();
     world_view_.reset();
     render_window_->Finalize();
-    ImGui_ImplOpenGL3_Shutdown();
-    ImGui_ImplGlfw_Shutdown();
-    ImGui::DestroyContext();
-    glfwDestroyWindow(window_);
-    glfwTerminate();
   }
   RehearsalWindow(const RehearsalWindow&) = delete;
   RehearsalWindow& operator=(const RehearsalWindow&) = delete;
 
-  int run() {
+  WindowEnd run() {
     if (control_.failure()) throw Error(*control_.failure());  // nothing was begun
-    while (glfwWindowShouldClose(window_) == 0 && !quit_ && !actions_.stop()) frame();
+    while (!shell_.closing() && !quit_ && !actions_.stop()) frame();
     if (control_.failure()) throw Error(*control_.failure());
     if (control_.lost()) throw Error(*control_.lost());
-    return gl_errors_;
+    return end_;
   }
 
  private:
   // --- set-up -----------------------------------------------------------------------------------------------------
 
-  void open(const WindowOptions& options) {
-    window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless");
+  // A session is begun and saved in a thread of its own: meanwhile the window says so, and answers.
+  WindowActions working(WindowActions actions) {
+    actions.begin = [this, begin = actions.begin](bool from_case, const HandView& view) {
+      HandGoal goal;
+      shell_.while_working(from_case ? "the bone is made ready" : "the session is made ready", {},
+                           [&](const Context&) { goal = begin(from_case, view); });
+      return goal;
+    };
+    actions.save = [this, save = actions.save, rehearsal = actions.rehearsal] {
+      if (rehearsal() != nullptr) shell_.while_working("the session is saved", {}, [&](const Context&) { save(); });
+    };
+    return actions;
+  }
 
+  void open() {
     render_window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
     render_window_->SetOwnContext(0);
     render_window_->SetIsCurrent(true);
@@ -110,18 +121,7 @@ class RehearsalWindow {
     render_window_->OpenGLInitContext();
     render_window_->SetFrameBlitModeToBlitToCurrent();
     render_window_->AddRenderer(renderer_);
-
-    // ImGui chains this callback behind its own.
-    glfwSetWindowUserPointer(window_, this);
-    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
-      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))->keyboard_.on(key, static_cast<Keyboard::Event>(action));
-    });
-    ImGui::CreateContext();
-    ImGui::GetIO().IniFilename = nullptr;
-    ImGui::StyleColorsDark();
-    ImGui::GetStyle().WindowRounding = 0;
-    ImGui_ImplGlfw_InitForOpenGL(window_, true);
-    ImGui_ImplOpenGL3_Init("#version 150");
+    shell_.on_key = [this](int key, int action) { keyboard_.on(key, static_cast<Keyboard::Event>(action)); };
     cuts_.create();
   }
 
@@ -149,6 +149,11 @@ class RehearsalWindow {
     rehearsal.look([&](const World& world, SceneReaders& readers) { world_view_->update(world, readers); });
     if (!tools_) tools_ = std::make_unique<SceneTools>(renderer_);
     cuts_.renew();
+    before_view_.reset();
+    room_.renew();
+    work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
+    rehearsal.add_reader(*work_);
+    ended_.reset();
   }
 
   void look_from(Vec3 eye) { look_at(renderer_, control_.centre_mm(), 0.8 * control_.radius_mm(), normalized(eye)); }
@@ -204,41 +209,45 @@ class RehearsalWindow {
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
-    glfwPollEvents();
-    glfwGetFramebufferSize(window_, &width_, &height_);
+    const bool seen = shell_.poll();
+    width_ = shell_.width();
+    height_ = shell_.height();
+    for (const auto& path : shell_.take_dropped()) {
+      end_ = {true, path};
+      quit_ = true;
+    }
     control_.watch();
     control_.look_from(view_axes());
-    if (width_ < 200 || height_ < 150) {  // put away
+    if (!seen) {  // put away
       write_state();
       glfwWaitEventsTimeout(0.05);
       return;
     }
-    begin_picture();
+    room_.lay_out(ended_.has_value());
+    shell_.new_frame();
     if (control_.failure()) {
       tell_failure();
+    } else if (ended_) {
+      show_end();
     } else {
       mouse_and_keys();
-      if (!control_.failure()) show();
+      if (!control_.failure() && !ended_) show();
     }
     end_picture();
     ++pictures_;
     write_state();
   }
 
-  void begin_picture() {
-    ImGui_ImplOpenGL3_NewFrame();
-    ImGui_ImplGlfw_NewFrame();
-    ImGui::NewFrame();
-  }
-
   void show() {
-    panel();
-    if (control_.failure()) return;
     Rehearsal& now = control_.rehearsal();
+    const RoomScene scene = room_scene(now);
+    room_.draw(scene);
+    if (screenshot_wanted_) room_.draw_caption(scene);
     draw_instrument(drawn_[0], control_.tool());
-    cuts_.draw(now, control_.tool(),
-               {static_cast<float>(width_ - kSliceWidth), 0, static_cast<float>(kSliceWidth), static_cast<float>(height_)});
-    if (show_help_) draw_help(show_help_, width_);
+    const auto of = [](const Box& b) { return CutsPanel::Box{b.x, b.y, b.width, b.height}; };
+    const RoomLayout& layout = room_.layout();
+    if (!layout.column.empty()) cuts_.draw(now, control_.tool(), of(layout.column));
+    if (!layout.cuts[0].empty()) cuts_.draw(now, control_.tool(), {of(layout.cuts[0]), of(layout.cuts[1]), of(layout.cuts[2])});
     now.look([&](const World& world, SceneReaders& readers) {
       world_view_->update(world, readers);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
@@ -253,7 +262,7 @@ class RehearsalWindow {
       place_tool(drawn_[hand], other);
     }
     tools_->show(control_.tools(), tick);
-    control_.wash(keyboard_.held(Command::suck), keyboard_.held(Command::wash));
+    control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck), keyboard_.held(Command::wash) || room_.holds(Command::wash));
     note_camera(now);
   }
 
@@ -269,10 +278,13 @@ class RehearsalWindow {
   void end_picture() {
     ImGui::Render();
     render_window_->SetSize(width_, height_);
-    const double left = static_cast<double>(kPanelWidth) / width_, right = 1 - static_cast<double>(kSliceWidth) / width_;
-    renderer_->SetViewport(left, 0, right, 1);
+    const Box& view = room_.layout().view;
+    const auto across = [&](float x) { return static_cast<double>(x) / width_; };
+    const auto up = [&](float y) { return 1 - static_cast<double>(y) / height_; };
+    renderer_->SetViewport(across(view.x), up(view.bottom()), across(view.right()), up(view.y));
+    if (before_view_) before_view_->place(renderer_, room_.before());
     renderer_->ResetCameraClippingRange();
-    if (world_view_ && !control_.failure()) world_view_->rest(width_ - kPanelWidth - kSliceWidth, height_);
+    if (world_view_ && !control_.failure()) world_view_->rest(static_cast<int>(view.width), static_cast<int>(view.height));
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClearColor(0.05F, 0.06F, 0.08F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
@@ -282,26 +294,100 @@ class RehearsalWindow {
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (screenshot_wanted_) save_screenshot();
-    for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
+    shell_.count_gl_errors();
     glfwSwapBuffers(window_);
   }
 
-  // While there is nothing else to see.
-  void show_words(const char* words) {
-    glfwPollEvents();
-    glfwGetFramebufferSize(window_, &width_, &height_);
-    begin_picture();
-    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 100, static_cast<float>(height_) / 2 - 20});
-    ImGui::Begin("words", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
-    ImGui::Text("%s", words);
-    ImGui::End();
-    end_picture();
+  [[nodiscard]] RoomScene room_scene(Rehearsal& now) {
+    MachineFacts machine;
+    machine.device = device_name_;
+    machine.drawn_millions = static_cast<double>(world_view_->drawn_triangles()) / 1e6;
+    machine.triangles_millions = static_cast<double>(world_view_->triangles()) / 1e6;
+    machine.scan = &scan_;
+    machine.approval = approval_;
+    machine.approval_ended = approval_ended_;
+    machine.case_hash = case_hash_;
+    vtkCamera* const camera = renderer_->GetActiveCamera();
+    const double pixels_per_mm = static_cast<double>(room_.layout().view.height) /
+                                 (2 * camera->GetDistance() * std::tan(camera->GetViewAngle() * std::numbers::pi / 360));
+    return {control_,
+            sound_,
+            now.latest(),
+            machine,
+            pixels_per_mm,
+            [this](Vec3 at) { return project(at); },
+            [this](Vec3 eye) { look_from(eye); },
+            [this, &now] { tools_->panel(control_.tools(), now, view_axes()); }};
+  }
+
+  // A point of the world in pixels of the window, from its upper left corner.
+  [[nodiscard]] std::optional<std::array<float, 2>> project(Vec3 at) {
+    const ViewAxes view = view_axes();
+    if (dot(at - view.eye_mm, view.forward) <= 0) return std::nullopt;
+    renderer_->SetWorldPoint(at.x, at.y, at.z, 1);
+    renderer_->WorldToDisplay();
+    const double* const p = renderer_->GetDisplayPoint();
+    return std::array<float, 2>{static_cast<float>(p[0]), static_cast<float>(height_ - 1 - p[1])};
+  }
+
+  // The bone as it was: made when it is first asked for, kept while the session runs. Between two frames.
+  void show_before(bool on) {
+    room_.set_before(on);
+    if (!on || before_view_) return;
+    if (!actions_.world_at_begin) {
+      room_.set_before(false);
+      control_.say("how the bone was is not known");
+      return;
+    }
+    try {
+      TriMesh mesh;
+      shell_.while_working("the bone as it was is made", {},
+                           [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
+      before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
+    } catch (const Error& e) {
+      room_.set_before(false);
+      control_.say(e.what());
+    }
+  }
+
+  // The session is saved; what was done is shown beside the bone as it was left.
+  void end_session() {
+    if (!end_page_ || !actions_.facts) {
+      quit_ = true;
+      return;
+    }
+    room_.set_before(false);
+    if (!control_.end()) return;
+    ended_ = end_facts(actions_.facts(), *work_);
+  }
+
+  void show_end() {
+    turn_by_mouse();
+    EndChoice choice = room_.draw_end(*ended_);
+    for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
+      if (choice == EndChoice::none) choice = Room::end_choice(press.command);
+      if (press.command == Command::screenshot) screenshot_wanted_ = true;
+      if (press.command == Command::full_screen) shell_.toggle_full_screen();
+    }
+    if (choice == EndChoice::another) end_.another = true;
+    if (choice == EndChoice::close || choice == EndChoice::another) quit_ = true;
+    if (choice == EndChoice::again || choice == EndChoice::resume) begin_again(choice == EndChoice::again);
+  }
+
+  // ImGui's frame is put aside meanwhile: what shows that it works needs one of its own.
+  void begin_again(bool from_case) {
+    ImGui::EndFrame();
+    const bool begun = control_.begin(from_case, false);
+    ended_.reset();  // failure() speaks for itself
+    if (begun) control_.say(from_case ? "the bone is whole again" : "a new session goes on from what was recorded");
+    shell_.new_frame();
   }
 
   // What failed, what is kept, and what can be done now. Nothing runs.
   void tell_failure() {
-    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 240, static_cast<float>(height_) / 3});
-    ImGui::SetNextWindowSize({480, 0});
+    const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
+    ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
+    ImGui::SetNextWindowSize({wide, 0});
     ImGui::Begin("No session runs", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
     ImGui::TextWrapped("%s", control_.failure()->what());
     if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
@@ -318,8 +404,7 @@ class RehearsalWindow {
       quit_ = quit_ || press.command == Command::quit;
       screenshot_wanted_ = screenshot_wanted_ || press.command == Command::screenshot;
     }
-    if ((go_on || anew) && control_.begin(anew, false))
-      control_.say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
+    if (go_on || anew) begin_again(anew);
   }
 
   void place_tool(DrawnHand& hand, const TickRecord& tick) {
@@ -346,14 +431,13 @@ class RehearsalWindow {
     HandTools& tools = control_.tools();
     const ImGuiIO& io = ImGui::GetIO();
     const ImVec2 m = io.MousePos;
-    const bool in_view = m.x >= kPanelWidth && m.x < static_cast<float>(width_ - kSliceWidth) && m.y >= 0 &&
-                         m.y < static_cast<float>(height_) && !show_help_;
+    const bool in_view = room_.layout().view.holds(m.x, m.y) && !room_.in_front();
     vtkCamera* const camera = renderer_->GetActiveCamera();
+    const std::optional<Vec3> direction = in_view ? std::optional(ray(static_cast<double>(m.x), static_cast<double>(m.y))) : std::nullopt;
+    bool measured = false;
     if (in_view && !io.WantCaptureMouse) {
-      if (ImGui::IsMouseDragging(ImGuiMouseButton_Right)) {
-        camera->Azimuth(-0.35 * static_cast<double>(io.MouseDelta.x));
-        camera->Elevation(0.35 * static_cast<double>(io.MouseDelta.y));
-        camera->OrthogonalizeViewUp();
+      if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = room_.click(bone_seen(direction), control_);
+      if (measured || turn_by_mouse()) {
       } else if (ImGui::IsMouseDragging(ImGuiMouseButton_Middle)) {
         double f[3], p[3];
         camera->GetFocalPoint(f);
@@ -381,13 +465,48 @@ class RehearsalWindow {
       }
     }
     control_.look_from(view_axes());  // the mouse may have turned it
-    const std::optional<Vec3> direction = in_view ? std::optional(ray(static_cast<double>(m.x), static_cast<double>(m.y))) : std::nullopt;
-    for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
-      if (!control_.command(press, direction)) command(press.command);
-      if (control_.failure()) return;
+    std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.writing());
+    for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
+    for (const Keyboard::Press& press : presses) {
+      do_press(press, direction);
+      if (control_.failure() || ended_ || quit_) return;
     }
-    control_.hold(
-        {static_cast<double>(io.DeltaTime), ImGui::IsMouseDown(ImGuiMouseButton_Left), in_view && !io.WantCaptureMouse, read_gamepad()});
+    const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
+    control_.hold({static_cast<double>(io.DeltaTime), ImGui::IsMouseDown(ImGuiMouseButton_Left), may_drill, read_gamepad()});
+  }
+
+  void do_press(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
+    // What begins or ends a session shows pictures of its own.
+    const bool long_work = press.command == Command::save || press.command == Command::quit || press.command == Command::perform ||
+                           press.command == Command::before;
+    if (long_work) ImGui::EndFrame();
+    const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
+    if (press.command == Command::before) {
+      show_before(!room_.before());
+    } else if (!room_.takes(press, control_, bone) && !control_.command(press, direction)) {
+      command(press.command);
+    }
+    if (long_work) shell_.new_frame();
+  }
+
+  [[nodiscard]] std::optional<Vec3> bone_seen(const std::optional<Vec3>& direction) {
+    if (!direction) return std::nullopt;
+    std::optional<BoneHit> hit;
+    const ViewAxes view = view_axes();
+    control_.rehearsal().look([&](const World& world, SceneReaders&) {
+      hit = bone_on_ray(world, view.eye_mm, *direction, length(control_.centre_mm() - view.eye_mm) + 4 * control_.radius_mm());
+    });
+    return hit ? std::optional(hit->at_mm) : std::nullopt;
+  }
+
+  bool turn_by_mouse() {
+    const ImGuiIO& io = ImGui::GetIO();
+    if (io.WantCaptureMouse || !ImGui::IsMouseDragging(ImGuiMouseButton_Right)) return false;
+    vtkCamera* const camera = renderer_->GetActiveCamera();
+    camera->Azimuth(-0.35 * static_cast<double>(io.MouseDelta.x));
+    camera->Elevation(0.35 * static_cast<double>(io.MouseDelta.y));
+    camera->OrthogonalizeViewUp();
+    return true;
   }
 
   // Saw and pieces: what the mouse drags is not the hand.
@@ -407,9 +526,8 @@ class RehearsalWindow {
   void command(Command command) {
     if (command == Command::screenshot) screenshot_wanted_ = true;
     if (command == Command::home) look_from(kFromLeft);
-    if (command == Command::help) show_help_ = !show_help_;
     if (command == Command::sound) sound_.turn(!sound_.on());
-    if (command == Command::quit) quit_ = true;
+    if (command == Command::quit) end_session();
   }
 
   void save_screenshot() {
@@ -437,74 +555,6 @@ class RehearsalWindow {
     }
   }
 
-  // --- panel, slices, help ------------------------------------------------------------------------------------------
-
-  void panel() {
-    Rehearsal& rehearsal = control_.rehearsal();
-    const TickRecord tick = rehearsal.latest();
-    ImGui::SetNextWindowPos({0, 0});
-    ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
-    ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-    ImGui::Text("Burr");
-    const Burr& burr = burr_library()[static_cast<std::size_t>(control_.tool())];
-    if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) control_.take_burr(BurrKind::cutting);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("diamond (D)", burr.kind == BurrKind::diamond)) control_.take_burr(BurrKind::diamond);
-    if (ImGui::RadioButton("ball (B)", burr.shape == BurrShape::ball)) control_.take_burr(BurrShape::ball);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("cyl. (Y)", burr.shape == BurrShape::cylinder)) control_.take_burr(BurrShape::cylinder);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("taper (T)", burr.shape == BurrShape::taper)) control_.take_burr(BurrShape::taper);
-    int diameter = static_cast<int>(burr.diameter_mm);
-    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) control_.take_burr_of(diameter);
-    if (bool on = control_.latched(); ImGui::Checkbox("drill on (left button, Space)", &on)) control_.latch(on);
-    ImGui::Separator();
-    tools_->panel(control_.tools(), rehearsal, view_axes());
-    ImGui::Separator();
-    if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) control_.say("point at the bone and press F");
-    if (ImGui::Button("Lift the drill out (U)", {-1, 0})) control_.lift();
-    if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
-    const bool saves = ImGui::Button("Save and go on (F5)", {-1, 0});
-    ImGui::Dummy({0, 6});
-    const bool resets = ImGui::Button("Reset the bone (R)", {-1, 0});
-    ImGui::Separator();
-    ImGui::Text("Look from");
-    if (ImGui::Button("left")) look_from(kFromLeft);
-    ImGui::SameLine();
-    if (ImGui::Button("right")) look_from({-0.94, -0.25, 0.22});
-    ImGui::SameLine();
-    if (ImGui::Button("front")) look_from({0, -1, 0.1});
-    ImGui::SameLine();
-    if (ImGui::Button("above")) look_from({0, -0.05, 1});
-    ImGui::Separator();
-    draw_status(rehearsal, tick);  // below the buttons, which its lines would move
-    draw_sound(sound_);
-    draw_settings(rehearsal);
-    ImGui::Separator();
-    ImGui::Text("hand: %s", device_name_.c_str());
-    ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
-    if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
-    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
-    ImGui::Text("%.2f of %.2f M triangles", static_cast<double>(world_view_->drawn_triangles()) / 1e6,
-                static_cast<double>(world_view_->triangles()) / 1e6);
-    ImGui::Text("%.0f pictures/s", static_cast<double>(ImGui::GetIO().Framerate));
-    ImGui::Separator();
-    draw_approval(approval_, approval_ended_);
-    draw_scan(scan_);
-    ImGui::TextWrapped("F1: mouse and keys");
-    if (const std::string told = control_.told(); !told.empty()) {
-      ImGui::Separator();
-      ImGui::TextWrapped("%s", told.c_str());
-    }
-    ImGui::End();
-    // Last: the rehearsal is another one afterwards.
-    if (saves) {
-      control_.save();
-    } else if (resets) {
-      control_.reset();
-    }
-  }
-
   // For tests: what can be seen, as numbers. Whole at any moment.
   void write_state() {
     if (state_file_.empty()) return;
@@ -516,7 +566,8 @@ class RehearsalWindow {
     state.session = actions_.folder();
     state.tool = burr_library()[static_cast<std::size_t>(control_.tool())].name();
     state.drill_latched = control_.latched();
-    state.help = show_help_;
+    state.help = room_.help();
+    state.room = room_state();
     state.sucking = control_.sucking();
     state.washing = control_.washing();
     state.sound = sound_.on();
@@ -542,6 +593,28 @@ class RehearsalWindow {
     write_window_state(state, state_file_);
   }
 
+  [[nodiscard]] RoomState room_state() const {
+    RoomState r;
+    r.layout = EnumNames<Layout>::values[static_cast<std::size_t>(room_.layout().shown)];
+    r.em_pixels = shell_.em_pixels();
+    r.full_screen = shell_.full_screen();
+    r.asking = room_.asking();
+    r.wheel = room_.wheel_open();
+    r.panel_keys = room_.keys_in_panel();
+    r.before = room_.before() && before_view_;
+    r.writing = room_.writing();
+    r.ended = ended_.has_value();
+    r.ruler = room_.ruler().on();
+    r.ruler_mm = room_.ruler().length_mm().value_or(0);
+    r.notes = room_.notes().all().size();
+    for (const Step& s : room_.steps().steps()) r.steps_done += s.done ? 1 : 0;
+    const Box& v = room_.layout().view;
+    r.view = {v.x, v.y, v.width, v.height};
+    return r;
+  }
+
+  WindowShell& shell_;
+  Room room_;
   RehearsalControl control_;
   WindowActions actions_;
   SoundOut& sound_;
@@ -549,26 +622,31 @@ class RehearsalWindow {
   const std::string approval_;
   const bool approval_ended_;
   std::filesystem::path state_file_;
-  GLFWwindow* window_ = nullptr;
-  int width_ = 0, height_ = 0;
+  std::unique_ptr<BeforeView> before_view_;
+  std::unique_ptr<WorkDone> work_;
+  std::optional<EndFacts> ended_;
+  WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
   std::array<DrawnHand, kMostHands> drawn_;
   std::unique_ptr<WorldView> world_view_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
-  std::string device_name_;
-  int gl_errors_ = 0;
+  std::string device_name_, case_hash_;
+  bool end_page_;
+  GLFWwindow* window_;
+  int width_ = 0, height_ = 0;
   std::uint64_t pictures_ = 0;
-  bool show_help_ = false, screenshot_wanted_ = false, quit_ = false;
+  bool screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
   CameraNotes camera_notes_;
 };
 
 }  // namespace
 
-int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound) {
-  return RehearsalWindow(options, hu, actions, sound).run();
+WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
+                               const WindowActions& actions, SoundOut& sound) {
+  return RehearsalWindow(shell, person, options, hu, actions, sound).run();
 }
 
 }  // namespace osteo

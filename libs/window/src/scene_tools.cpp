@@ -101,11 +101,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
   if (tools.tool() == Tool::plate) plate_panel(tools, rehearsal);
   std::vector<Fixture> fixtures;
-  std::size_t steps = 0;
-  rehearsal.look([&](const World& world, SceneReaders&) {
-    fixtures = world.fixtures();
-    steps = world.undo_steps();
-  });
+  rehearsal.look([&](const World& world, SceneReaders&) { fixtures = world.fixtures(); });
   for (const Fixture& f : fixtures) {
     const PlateModel& model = plate_library()[f.plate];
     ImGui::PushID(static_cast<int>(f.id));
@@ -119,7 +115,6 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     }
     ImGui::PopID();
   }
-  if (steps > 0 && ImGui::Button("Undo (Z)")) tools.undo(rehearsal);
   if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
 }
 
