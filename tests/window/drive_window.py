@@ -210,6 +210,7 @@ def keys():
         assert not measured["drill_on"] and measured["removed_mm3"] == 0, measured
         w.key("F9", "ruler away", lambda s: not s["ruler"])
         w.key("m", "a note is written", lambda s: s["writing"])
+        w.next(3)  # the field has the keys
         w.x("type", "--delay", "100", "spine")
         w.next()
         w.x("key", "Return")

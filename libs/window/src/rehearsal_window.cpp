@@ -121,7 +121,10 @@ class RehearsalWindow {
     render_window_->OpenGLInitContext();
     render_window_->SetFrameBlitModeToBlitToCurrent();
     render_window_->AddRenderer(renderer_);
-    shell_.on_key = [this](int key, int action) { keyboard_.on(key, static_cast<Keyboard::Event>(action)); };
+    shell_.on_key = [this](int key, int action) {
+      if (action == 1) room_.key(key);
+      keyboard_.on(key, static_cast<Keyboard::Event>(action));
+    };
     cuts_.create();
   }
 

@@ -42,6 +42,14 @@ void Room::renew() {
   wheel_.close();
 }
 
+void Room::key(int code) {
+  if (!writing_) return;
+  const Key* const known = find_key(code);
+  if (known == nullptr) return;
+  if (known->command == Command::perform) note_answer_ = 1;
+  if (known->command == Command::put_away) note_answer_ = -1;
+}
+
 std::vector<Keyboard::Press> Room::take_presses() {
   return std::exchange(pressed_.presses, {});
 }
@@ -126,6 +134,7 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
       // Where the mouse is; a button in the panel: where the burr is.
       writing_ = bone ? *bone : from_floats(control.rehearsal().latest().device.position_mm);
       note_text_.clear();
+      note_answer_ = 0;
       write_focus_ = true;
       return true;
     case Command::reset:
@@ -313,11 +322,11 @@ void Room::draw_note_field(RehearsalControl& control) {
   if (write_focus_) ImGui::SetKeyboardFocusHere();
   write_focus_ = false;
   ImGui::SetNextItemWidth(-1);
-  const bool entered = ImGui::InputText("##note", &note_text_, ImGuiInputTextFlags_EnterReturnsTrue);
-  const bool escaped = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+  ImGui::InputText("##note", &note_text_);
   ImGui::TextDisabled("Enter keeps it; empty: marks this moment; Esc: nothing");
   ImGui::End();
-  if (entered) {
+  const int answer = std::exchange(note_answer_, 0);
+  if (answer > 0) {
     if (const auto note = notes_.pin(*writing_, note_text_)) {
       control.rehearsal().note("note", *note);
       control.say("note " + std::to_string(notes_.all().back().number) + " is pinned");
@@ -326,7 +335,7 @@ void Room::draw_note_field(RehearsalControl& control) {
       control.say("marked");
     }
   }
-  if (entered || escaped) writing_.reset();
+  if (answer != 0) writing_.reset();
 }
 
 void Room::draw_marks(const RoomScene& scene) {

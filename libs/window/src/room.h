@@ -64,6 +64,8 @@ class Room {
 
   /// Another session has begun.
   void renew();
+  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture, which ImGui misses.
+  void key(int code);
   /// Presses of buttons since the last call, as if they were keys.
   [[nodiscard]] std::vector<Keyboard::Press> take_presses();
   /// A button that does it is held down.
@@ -104,6 +106,7 @@ class Room {
   std::size_t undo_steps_ = 0;
   std::optional<Vec3> writing_;  // where a note is pinned
   std::string note_text_;
+  int note_answer_ = 0;  // 1: kept, -1: not
 };
 
 }  // namespace osteo

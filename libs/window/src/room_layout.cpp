@@ -35,7 +35,8 @@ RoomLayout lay_out(Layout wanted, int width, int height, float em) {
   const float above = h - state;
   switch (out.shown) {
     case Layout::beside: {
-      const float panel = ems(kPanelEm), column = ems(kColumnEm);
+      // Squares one below the other use the column's height, where the picture can spare the width.
+      const float panel = ems(kPanelEm), column = std::round(std::max(kColumnEm * em, std::min(h / 3 - 2 * em, 0.24F * w)));
       out.panel = {0, 0, panel, h};
       out.column = {w - column, 0, column, h};
       out.view = {panel, 0, w - panel - column, above};

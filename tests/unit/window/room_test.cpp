@@ -8,6 +8,7 @@
 #include "marks.h"
 #include "palette.h"
 #include "room_layout.h"
+#include "state_facts.h"
 #include "steps.h"
 #include "tool_wheel.h"
 #include "work_done.h"
@@ -65,6 +66,10 @@ TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
       EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why;
       EXPECT_TRUE(l.why.empty());
     }
+    // On a large screen cuts are large too, and the picture is still the largest.
+    const RoomLayout beside = lay_out(Layout::beside, s.width, s.height, em);
+    EXPECT_GE(beside.column.width, std::min(0.22F * static_cast<float>(s.width), 0.28F * static_cast<float>(s.height)));
+    EXPECT_GT(beside.view.width, 0.44F * static_cast<float>(s.width));
     // Operate is for the picture.
     const RoomLayout l = lay_out(Layout::operate, s.width, s.height, em);
     EXPECT_GT(l.view.width * l.view.height, 0.78F * static_cast<float>(s.width) * static_cast<float>(s.height));
@@ -273,6 +278,42 @@ TEST(FirstSteps, WithoutDustNothingIsSucked) {
   EXPECT_FALSE(list.steps()[2].possible);
   EXPECT_FALSE(list.steps()[2].done);
   EXPECT_NE(list.steps()[2].words.find("--dust"), std::string::npos);
+}
+
+// --- what the burr does now
+
+TEST(StateFacts, TellWhatTheTickTells) {
+  TickRecord tick;
+  tick.tick = 187000;
+  tick.device.tool = 3;
+  StateFacts f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.tool, "cutting 4 mm");
+  EXPECT_EQ(f.speed, "still");
+  EXPECT_FALSE(f.turning);
+  EXPECT_EQ(f.under, "-");
+  EXPECT_EQ(f.structure, "none in this case");
+  EXPECT_EQ(f.nearness, Nearness::unknown);
+  EXPECT_EQ(f.time, "3:07");
+  EXPECT_EQ(f.warning, "");
+  tick.speed_rpm = 41180;
+  tick.force_n = {3, 0, 4};
+  tick.thickness_mm = 2.34F;
+  tick.flags = kShaftContact;
+  f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.speed, "41000 rpm");
+  EXPECT_EQ(f.force, "5.00 N");
+  EXPECT_EQ(f.force_share, 1);
+  EXPECT_EQ(f.under, "2.3 mm");
+  EXPECT_EQ(f.warning, "the shaft touches bone");
+  EXPECT_FALSE(f.alarm);
+  // The worse comes first.
+  tick.thickness_mm = 10;
+  tick.flags |= kEscape | kPlateInHand;
+  f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.under, "over 10 mm");
+  EXPECT_EQ(f.tool, "plate in the hand");
+  EXPECT_TRUE(f.alarm);
+  EXPECT_EQ(f.warning, "the burr is buried in bone");
 }
 
 // --- the page at the end
