@@ -366,7 +366,7 @@ struct WindowCommand {
     shown.by_hand = person.values.scale;
     shown.full_screen = person.values.full_screen;
     WindowShell shell(shown);
-    bool lost_ticks = false, closed = false;
+    bool lost_ticks = false, closed = false, sat = false;
     Params flags = p;
     StartOptions start;
     start.state_file = p.state_file;
@@ -386,6 +386,7 @@ struct WindowCommand {
         shell.while_working("the case is opened", io.context,
                             [&](const Context&) { open = open_case(choice->case_folder, p.require_approved); });
         person.opened(open->files.folder);
+        sat = true;
         lost_ticks = sit(flags, *open, shell, person, io, left) || lost_ticks;
         closed = !left.another;
         start.message.clear();
@@ -405,7 +406,7 @@ struct WindowCommand {
     keep(before, person.values, kept);
     person.values = kept;
     if (const std::string not_kept = person.save(); !not_kept.empty()) io.context.warn(not_kept);
-    if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; the session is saved");
+    if (io.context.cancelled()) throw Error(ExitCode::cancelled, sat ? "ended from outside; the session is saved" : "ended from outside");
     if (shell.gl_errors() > 0)
       throw Error(ExitCode::failed, std::to_string(shell.gl_errors()) + " OpenGL errors were seen; the session is saved",
                   "please report this with the name of the graphics card");

@@ -450,7 +450,7 @@ EndChoice Room::draw_end(const EndFacts& facts) {
   ImGui::Separator();
   ImGui::TextDisabled("files");
   ImGui::TextWrapped("%s", facts.folder.string().c_str());
-  ImGui::TextWrapped("summary.json tells all of this; stream.oss replays it: osteo replay SESSION");
+  ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
   for (const std::string& w : facts.warnings) {
     ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
     ImGui::TextWrapped("! %s", w.c_str());

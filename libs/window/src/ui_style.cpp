@@ -65,6 +65,8 @@ void set_ui_style(int em_pixels) {
   style.Colors[ImGuiCol_Border] = {0.25F, 0.29F, 0.34F, 1};
   style.Colors[ImGuiCol_ButtonHovered] = style.Colors[ImGuiCol_FrameBgHovered] = {0.20F, 0.27F, 0.35F, 1};
   style.Colors[ImGuiCol_ButtonActive] = style.Colors[ImGuiCol_FrameBgActive] = im_colour(kBlue);
+  style.Colors[ImGuiCol_Header] = style.Colors[ImGuiCol_HeaderActive] = im_colour(kBlue);  // what is chosen stands out, not the mouse
+  style.Colors[ImGuiCol_HeaderHovered] = {0.20F, 0.27F, 0.35F, 1};
   style.Colors[ImGuiCol_CheckMark] = style.Colors[ImGuiCol_SliderGrab] = im_colour(kSkyBlue);
   style.Colors[ImGuiCol_NavHighlight] = im_colour(kYellow);
   style.Colors[ImGuiCol_PlotHistogram] = im_colour(kSkyBlue);
