@@ -19,6 +19,13 @@ struct EnumNames<Hand> {
   static constexpr std::array<std::string_view, 5> values{"auto", "mouse", "spacemouse", "woodenhaptics", "marker"};
 };
 
+/// Of the window at the start.
+enum class StartLayout : int { last, beside, operate, plan };
+template <>
+struct EnumNames<StartLayout> {
+  static constexpr std::array<std::string_view, 4> values{"last", "beside", "operate", "plan"};
+};
+
 /// What moves the second hand.
 enum class SecondHand : int { keys, spacemouse, woodenhaptics };
 template <>
@@ -59,6 +66,10 @@ struct WindowFlags {
   Quality quality = Quality::automatic;
   int width = 1360;
   int height = 860;
+  double scale = 0;
+  StartLayout layout = StartLayout::last;
+  bool full_screen = false;
+  bool end_page = true;
   std::string state_file;
   static void describe(WindowFlags& p, auto& visit) {
     visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
@@ -109,6 +120,10 @@ struct WindowFlags {
           p.quality);
     visit({"width", "of the window; no more than the screen has", "pixels", 640, 8192}, p.width);
     visit({"height", "of the window; no more than the screen has", "pixels", 480, 8192}, p.height);
+    visit({"scale", "of text and panels (0: by the monitor); Ctrl + and Ctrl - in the window", "", 0, 4}, p.scale);
+    visit({"layout", "of the window at the start; last: as it was left. F2 in the window"}, p.layout);
+    visit({"full_screen", "the window fills the screen; F11 in the window"}, p.full_screen);
+    visit({"end_page", "when the person ends the session (Q), what was done is shown; without, the window closes"}, p.end_page);
     visit({"state_file", "the window writes what it shows there as JSON after each picture, for tests (empty: nowhere)"}, p.state_file);
   }
 };

@@ -43,6 +43,7 @@ _osteo() {
     "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --position") COMPREPLY=($(compgen -W "supine prone sitting left_side right_side " -- "$cur")); return ;;
     "rehearse --quality") COMPREPLY=($(compgen -W "auto plain calm deep " -- "$cur")); return ;;
+    "rehearse --layout") COMPREPLY=($(compgen -W "last beside operate plan " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
     "markers --paper") COMPREPLY=($(compgen -W "a4 letter " -- "$cur")); return ;;
   esac
@@ -95,6 +96,7 @@ _osteo() {
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --quality --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --scale --layout --full-screen --end-page --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     score) flags="$flags --procedure --mirror --reference --subject --csv --evidence --case-folder" ;;
     export) flags="$flags" ;;

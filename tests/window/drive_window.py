@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Drives the window under Xvfb and checks each effect. Waits for what it wants to see, never for a time.
-usage: drive_window.py keys|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
+usage: drive_window.py keys|room|hand|signals|failures BIN_DIR WORK_DIR SOURCE_DIR"""
 import array, csv, json, math, os, pathlib, re, resource, shutil, signal, subprocess, sys, time
 
 part, bin_dir, work, source = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3]), pathlib.Path(sys.argv[4])
@@ -49,14 +49,16 @@ class Screen:
 
 
 class Window:
-    def __init__(self, *args, case="case", before=None):
+    def __init__(self, *args, case="case", before=None, end_page=False):
         self.file = pathlib.Path(f"state-{time.monotonic_ns()}.json")
         self.log = open(f"{self.file}.log", "w+")
         # Straight to the window's program, so that signals go to it whoever starts it.
-        self.app = subprocess.Popen([bin_dir / "osteo-rehearse", case, "--state-file", self.file, *map(str, args)], stderr=self.log, preexec_fn=before)
+        self.app = subprocess.Popen([bin_dir / "osteo-rehearse", *([case] if case else []), "--state-file", self.file, *([] if end_page else ["--no-end-page"]), *map(str, args)], stderr=self.log, preexec_fn=before)
         wait("the window's first picture", lambda: self.file.exists() or self.app.poll() is not None)
         assert self.app.poll() is None, (self.app.returncode, self.said())
         self.id = wait("the window", lambda: self.x("search", "--name", "^Osteotome").split())[-1]
+        if not case:  # the start page
+            return
         wait("the first tick", lambda: self.state()["tick"] > 0)
         self.x("mousemove", 480, 330)
         self.next()
@@ -192,7 +194,47 @@ def keys():
         w.drag(3, 30, 10)
         assert w.state()["drawn"] > rested["drawn"] + 1, (rested, w.state())
         key("Home", "view from the left", lambda s: dot(s["eye"], before["eye"]) > 0.9999)
-        key("m", "mark", lambda s: s["message"] == "marked")
+        key("m", "a note is written", lambda s: s["writing"])
+        w.x("key", "Return")
+        w.until("without text it marks", lambda s: s["message"] == "marked" and not s["writing"])
+        # The room: none of it changes what is felt.
+        em = w.state()["em_pixels"]
+        w.key("ctrl+minus", "smaller text", lambda s: s["em_pixels"] < em)
+        w.key("ctrl+0", "text as the monitor has it", lambda s: s["em_pixels"] == em)
+        view = w.state()["view"]
+        key("F2", "operate", lambda s: s["layout"] == "operate" and s["view"][2] > view[2])
+        key("F2", "plan", lambda s: s["layout"] == "plan")
+        key("F2", "beside", lambda s: s["layout"] == "beside" and s["view"] == view)
+        key("F11", "full screen", lambda s: s["full_screen"])
+        key("F11", "a window again", lambda s: not s["full_screen"])
+        key("F10", "keys in the panel", lambda s: s["panel_keys"])
+        w.key("Escape", "keys given back", lambda s: not s["panel_keys"])
+        key("Tab", "wheel", lambda s: s["wheel"])
+        w.key("Down", "still open", lambda s: s["wheel"])
+        w.key("Down", "still open", lambda s: s["wheel"])
+        w.key("Return", "the second of the wheel", lambda s: not s["wheel"] and s["tool"] == "diamond 5 mm")
+        key("c", "cutting", lambda s: s["tool"] == "cutting 5 mm")
+        key("w", "as it was", lambda s: s["before"])
+        key("w", "as it is", lambda s: not s["before"])
+        key("F9", "ruler", lambda s: s["ruler"])
+        w.x("mousemove", 490, 300)
+        w.next()
+        w.x("click", 1)
+        w.next()
+        w.x("mousemove", 530, 330)
+        w.next()
+        w.x("click", 1)
+        measured = w.until("measured", lambda s: s["ruler_mm"] > 1)
+        assert not measured["drill_on"] and measured["removed_mm3"] == 0, measured
+        w.key("F9", "ruler away", lambda s: not s["ruler"])
+        w.key("m", "a note is written", lambda s: s["writing"])
+        w.next(3)  # the field has the keys
+        w.x("type", "--delay", "100", "spine")
+        w.next()
+        w.x("key", "Return")
+        w.until("pinned", lambda s: s["notes"] == 1 and not s["writing"])
+        w.x("mousemove", 480, 330)
+        w.next()
         key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.
         key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
@@ -254,7 +296,10 @@ def keys():
                 break
         key("Return", "plate fixed", lambda s: s["fixtures"] == 1 and s["hand"] == "drill")
         key("z", "plate off", lambda s: s["fixtures"] == 0)
-        third = key("r", "bone whole again", lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0)["session"]
+        key("r", "asks", lambda s: s["asking"])
+        w.key("Escape", "no", lambda s: not s["asking"] and s["session"] == second)
+        w.key("r", "asks", lambda s: s["asking"])
+        third = w.key("Return", "bone whole again", lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0)["session"]
         pressed.add("q")
         said = w.close()
     for s in ("first", first, second, third):
@@ -269,6 +314,7 @@ def keys():
     osteo("export", "first", "first.csv")
     notes = pathlib.Path("first-notes.csv").read_text()
     assert '"mark"' in notes and "eye_mm" in notes, notes
+    assert "length_mm" in notes and "spine" in notes, notes
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
@@ -277,6 +323,52 @@ def keys():
     assert len(table) > 30, table
     wanted = {k[1].lower() if k[0] == "'" else named.get(k, k[1:]) for k in table}
     assert wanted == pressed, (wanted - pressed, pressed - wanted)
+
+
+def room():
+    """From the start page to the end page, by keys alone."""
+    make_case()
+    pathlib.Path("broken").mkdir()
+    pathlib.Path("broken/manifest.json").write_text('{"osteotome_case": 1')
+    settings = work / "config/osteotome/settings.json"
+    settings.parent.mkdir(parents=True)
+    settings.write_text('{"osteotome_settings": 1, "layout": "operate",\n"colour": "red"}')
+    with Screen():
+        w = Window(case=None, end_page=True)
+        said = w.until("warned of a key that is not known", lambda s: "no setting" in w.said())
+        assert said["page"] == "start" and "line 2" in w.said(), (said, w.said())
+
+        def choose(name):
+            at = [e.split(":")[-1].strip() for e in w.state()["entries"]].index(name)
+            while (now := w.state()["selected"]) != at:
+                w.key("Down" if now < at else "Up", "selected moves", lambda s: s["selected"] != now)
+
+        # A case that cannot be opened says why, and another can be chosen.
+        choose("broken")
+        w.x("key", "Return")
+        s = w.until("says why", lambda s: s.get("page") == "start" and "JSON" in s["message"])
+        choose("case")
+        w.x("key", "Return")
+        first = w.until("the first tick", lambda s: s.get("page") != "start" and s["tick"] > 0)
+        assert first["layout"] == "operate", first
+        # What is changed is kept.
+        w.key("F2", "plan, or what there is room for", lambda s: s["message"] != first["message"])
+        w.key("F2", "beside", lambda s: s["layout"] == "beside")
+        ended = w.key("q", "the page at the end", lambda s: s["ended"])
+        closed(ended["session"])
+        again = w.key("F5", "goes on", lambda s: not s["ended"] and s["tick"] > 0 and s["session"] != ended["session"])
+        w.key("q", "the page at the end", lambda s: s["ended"])
+        w.key("r", "again", lambda s: not s["ended"] and s["tick"] > 0 and s["session"] != again["session"])
+        w.key("q", "the page at the end", lambda s: s["ended"])
+        w.key("Home", "another case", lambda s: s.get("page") == "start")
+        assert any("case" in e for e in w.state()["entries"][:1]), w.state()
+        w.x("key", "q")
+        w.end(0)
+    kept = json.loads(settings.read_text())
+    assert kept["layout"] == "beside" and kept["colour"] == "red" and len(kept["recent_cases"]) == 1, kept
+    sessions = sorted(p for p in pathlib.Path("case/sessions").iterdir())
+    assert len(sessions) == 3, sessions
+    assert json.loads((sessions[1] / "session.json").read_text()).get("resumed_from"), sessions
 
 
 def hand():
@@ -414,6 +506,7 @@ shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 os.chdir(work)
 os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
+os.environ["XDG_CONFIG_HOME"] = str(work / "config")  # nobody's own settings, and none are left behind
 if __name__ == "__main__":
-    {"keys": keys, "hand": hand, "signals": signals, "failures": failures}[part]()
+    {"keys": keys, "room": room, "hand": hand, "signals": signals, "failures": failures}[part]()
     print(f"window {part}: all as it should be")

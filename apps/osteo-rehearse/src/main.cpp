@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <iostream>
+#include <mutex>
 #include <utility>
 
 #include "osteo/base/error.h"
@@ -19,6 +20,7 @@
 #include "osteo/scene/session_folder.h"
 #include "osteo/view/live_cut.h"
 #include "osteo/window/rehearsal_window.h"
+#include "osteo/window/start_page.h"
 #include "window_flags.h"
 
 namespace osteo {
@@ -165,13 +167,13 @@ void close_at_exit();
 // One session after another on a case. Between them, and after whatever throws, none runs.
 class Sitting {
  public:
-  Sitting(const WindowFlags& flags, const Case& the_case, cli::Invocation& io)
+  Sitting(const WindowFlags& flags, const Case& the_case, const PersonValues& person, cli::Invocation& io)
       : case_(the_case),
         io_(io),
         hands_(flags),
         next_folder_(flags.out),
         last_(flags.resume),
-        sound_(flags.sound, flags.volume, flags.alarms) {
+        sound_(person.sound, person.volume, person.alarms) {
     options_.rate_hz = flags.rate_hz;
     options_.follow = {true, true, flags.dust};
     options_.actions = first_actions(flags);
@@ -179,7 +181,9 @@ class Sitting {
     apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
   }
 
+  // Begun and saved in threads of their own; whoever ends the program meanwhile waits.
   HandGoal begin(bool from_case, const HandView& view) {
+    const std::lock_guard lock(mutex_);
     sound_.follow(nullptr);
     rehearsal_.reset();
     if (!has_anatomy_) {  // the same for all sessions
@@ -224,6 +228,7 @@ class Sitting {
   }
 
   void save() {
+    const std::lock_guard lock(mutex_);
     if (!rehearsal_) return;
     sound_.follow(nullptr);
     // Whatever comes of it, it is over; and what was recorded can be gone on from.
@@ -231,6 +236,7 @@ class Sitting {
     last_ = session_.folder;
     const RehearsalSummary s = over->stop();
     write_summary(session_, s, options_.rate_hz, "window", options_.anatomy);
+    facts_ = facts_of(s);
     for (const std::string& w : s.warnings) io_.context.warn(w);
     // Told even when quiet: the exit code is about it.
     if (!s.gaps.empty()) {
@@ -243,6 +249,10 @@ class Sitting {
   }
 
   [[nodiscard]] Rehearsal* rehearsal() const { return rehearsal_.get(); }
+  /// Of the session that was saved last.
+  [[nodiscard]] const SessionFacts& facts() const { return facts_; }
+  /// As the session that runs, or ran last, began with it.
+  [[nodiscard]] World at_begin(const Context& context) const { return world_at_begin(session_, case_, options_.anatomy, context); }
   [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
   [[nodiscard]] SoundOut& sound() { return sound_; }
   [[nodiscard]] std::string device() const { return hands_.name(); }
@@ -252,12 +262,37 @@ class Sitting {
   [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
 
  private:
+  [[nodiscard]] SessionFacts facts_of(const RehearsalSummary& s) const {
+    SessionFacts f;
+    f.folder = session_.folder;
+    f.rate_hz = options_.rate_hz;
+    f.seconds = static_cast<double>(s.ticks) / options_.rate_hz;
+    f.removed_mm3 = s.removed_mm3;
+    f.sawn_mm3 = s.sawn_mm3;
+    f.tissue_mm3 = s.tissue_mm3;
+    f.bodies = s.bodies;
+    for (const Fixture& p : s.fixtures) f.plates.push_back(std::to_string(p.id) + ": " + plate_library()[p.plate].name);
+    const StructureMap* const map = options_.anatomy.structures.get();
+    f.has_structures = map != nullptr;
+    for (const auto& [value, e] : s.structures) {
+      if (map == nullptr) break;
+      f.structures.push_back({map->name_of(static_cast<std::uint8_t>(value)), e.least_clearance_mm,
+                              static_cast<double>(e.ticks_touched) / options_.rate_hz,
+                              static_cast<double>(e.ticks_injured) / options_.rate_hz});
+    }
+    f.warnings = s.warnings;
+    if (!s.gaps.empty()) f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
+    return f;
+  }
+
   const Case& case_;
   cli::Invocation& io_;
   const Hands hands_;
   std::filesystem::path next_folder_, last_;
   RehearsalOptions options_;
   SessionFolder session_;
+  SessionFacts facts_;
+  std::mutex mutex_;
   std::unique_ptr<Rehearsal> rehearsal_;
   SoundOut sound_;  // before the rehearsal it follows, it goes
   bool has_anatomy_ = false, lost_ticks_ = false, told_silence_ = false;
@@ -278,54 +313,96 @@ void close_at_exit() {
   ::_exit(code);
 }
 
+// A case with what the window shows of it. Read in a thread of its own.
+struct OpenCase {
+  Case files;
+  std::optional<SparseGrid> hu;
+  std::optional<Image> ct;        // the whole scan, where it was given
+  std::vector<SparseGrid> bone;   // density, the finest first
+  ApprovalNow approval;
+  VerdictSummary scan;
+  std::string hash;
+};
+std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& flags, const Context& context) {
+  auto open = std::make_unique<OpenCase>();
+  open->files = load_case(folder);
+  open->approval = approval_of(open->files.folder);
+  if (flags.require_approved) require_approval(open->approval, open->files.folder);
+  if (const auto it = open->files.files.find("hu"); it != open->files.files.end()) open->hu = load_grid(it->second);
+  if (const auto it = open->files.files.find("verdict"); it != open->files.files.end()) open->scan = read_verdict(read_text(it->second));
+  open->hash = hash_path(open->files.folder / "manifest.json");
+  if (const auto it = open->files.files.find("region"); it != open->files.files.end()) open->bone.push_back(load_grid(it->second));
+  open->bone.push_back(open->files.bone);
+  if (!flags.scan.empty()) {
+    open->ct = load_image(flags.scan, context);
+    constexpr double kOwnHu = 60;
+    if (!open->hu) {
+      context.warn("this case keeps no CT values, so whether --scan is its scan could not be checked");
+    } else if (!(difference_hu(*open->hu, *open->ct) < kOwnHu)) {
+      throw Error(ExitCode::usage, "--scan is not the scan of this case, or does not lie where it lay",
+                  "'osteo hand-over CASE FOLDER' writes the case's own as ct.nrrd");
+    }
+  }
+  return open;
+}
+
 struct WindowCommand {
   using Params = WindowFlags;
   static void describe(Params& p, auto& visit) { WindowFlags::describe(p, visit); }
   static cli::CommandInfo info() {
-    return {"rehearse",
-            "drill the bone of a case in a window",
-            "What 'osteo rehearse CASE' opens. Exit code 8 when ticks were not recorded, since the disk did not keep up.",
-            {{"case", "a folder made by prepare"}},
-            "osteo-rehearse CASE"};
+    return {
+        "rehearse",
+        "drill the bone of a case in a window",
+        "What 'osteo rehearse CASE' opens; without a case, a page to choose one on. Exit code 8 when ticks were not recorded, since the "
+        "disk did not keep up.",
+        {{"case", "a folder made by prepare", true}},
+        "osteo-rehearse CASE"};
   }
 
-  static int run(const Params& p, cli::Invocation& io) {
-    const Case the_case = load_case(io.arguments[0]);
-    const ApprovalNow approval = approval_of(the_case.folder);
-    if (p.require_approved) require_approval(approval, the_case.folder);
-    if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
-      io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
-    std::optional<SparseGrid> hu;
-    if (const auto it = the_case.files.find("hu"); it != the_case.files.end()) hu = load_grid(it->second);
+  // What was given beats what the person chose last.
+  static PersonValues chosen(const Params& p, const cli::Invocation& io, PersonValues values) {
+    const auto given = [&](const char* name) { return io.given.contains(name); };
+    if (given("sound")) values.sound = p.sound;
+    if (given("volume")) values.volume = p.volume;
+    if (given("alarms")) values.alarms = p.alarms;
+    if (given("full_screen")) values.full_screen = p.full_screen;
+    if (p.layout != StartLayout::last) values.layout = EnumNames<StartLayout>::values[static_cast<std::size_t>(p.layout)];
+    return values;
+  }
+  // What was changed in the window since `before` is the person's choice from now on.
+  static void keep(const PersonValues& before, const PersonValues& now, PersonValues& kept) {
+    const auto take = [&](auto PersonValues::*field) {
+      if (before.*field != now.*field) kept.*field = now.*field;
+    };
+    take(&PersonValues::scale);
+    take(&PersonValues::layout);
+    take(&PersonValues::full_screen);
+    take(&PersonValues::sound);
+    take(&PersonValues::volume);
+    take(&PersonValues::alarms);
+    take(&PersonValues::remember_cases);
+    take(&PersonValues::first_steps);
+  }
+
+  // One case, from its first session to the last. `left`: how the person left it.
+  static bool sit(const Params& p, const OpenCase& open, WindowShell& shell, PersonSettings& person, cli::Invocation& io, WindowEnd& left) {
     WindowOptions window;
-    if (!p.scan.empty()) {
-      window.ct = load_image(p.scan, io.context);
-      constexpr double kOwnHu = 60;
-      if (!hu) {
-        io.context.warn("this case keeps no CT values, so whether --scan is its scan could not be checked");
-      } else if (!(difference_hu(*hu, *window.ct) < kOwnHu)) {
-        throw Error(ExitCode::usage, "--scan is not the scan of this case, or does not lie where it lay",
-                    "'osteo hand-over CASE FOLDER' writes the case's own as ct.nrrd");
-      }
-    }
-    window.title = "Osteotome - " + the_case.folder.filename().string();
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
-    window.quality = p.quality;
-    window.width = p.width;
-    window.height = p.height;
     window.state_file = p.state_file;
-    if (const auto it = the_case.files.find("region"); it != the_case.files.end()) window.bone.push_back(load_grid(it->second));
-    window.bone.push_back(the_case.bone);
+    window.end_page = p.end_page;
+    window.case_hash = open.hash;
+    window.approval = open.approval.words();
+    window.approval_ended = open.approval.state == ApprovalState::outdated;
+    window.scan = open.scan;
+    window.quality = p.quality;
+    window.ct = open.ct;
+    window.bone = open.bone;
     window.stereo.mode = p.stereo;
     window.stereo.base_mm = p.stereo_base;
-    if (!p.experiment.empty() && p.experiment != "camera")
-      throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
     window.camera_trial = p.experiment == "camera";
-    window.approval = approval.words();
-    window.approval_ended = approval.state == ApprovalState::outdated;
-    if (const auto it = the_case.files.find("verdict"); it != the_case.files.end()) window.scan = read_verdict(read_text(it->second));
-    Sitting sitting(p, the_case, io);
+    shell.set_title("Osteotome - " + open.files.folder.filename().string());
+    Sitting sitting(p, open.files, person.values, io);
     window.device = sitting.device();
     io.end_progress();
 
@@ -338,22 +415,91 @@ struct WindowCommand {
     actions.camera = [&](bool lend) { return sitting.camera(lend); };
     actions.press = [&](bool drill) { sitting.press(drill); };
     actions.stop = [&] { return io.context.cancelled(); };
+    actions.facts = [&] { return sitting.facts(); };
+    actions.world_at_begin = [&](const Context& context) { return sitting.at_begin(context); };
     g_sitting = &sitting;
-    int gl_errors = 0;
     try {
-      gl_errors = run_rehearsal_window(window, hu ? &*hu : nullptr, actions, sitting.sound());
+      left = run_rehearsal_window(shell, person, window, open.hu ? &*open.hu : nullptr, actions, sitting.sound());
     } catch (...) {
       g_sitting = nullptr;
       sitting.save();
       throw;
     }
     g_sitting = nullptr;
+    person.values.sound = sitting.sound().on();
+    person.values.volume = sitting.sound().volume();
+    person.values.alarms = sitting.sound().alarms();
     sitting.save();
-    if (io.context.cancelled()) throw Error(ExitCode::cancelled, "ended from outside; the session is saved");
-    if (gl_errors > 0)
-      throw Error(ExitCode::failed, std::to_string(gl_errors) + " OpenGL errors were seen; the session is saved",
+    return sitting.lost_ticks();
+  }
+
+  static int run(const Params& p, cli::Invocation& io) {
+    if (!p.experiment.empty() && p.experiment != "camera")
+      throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
+    if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
+      io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
+    PersonSettings person(PersonSettings::usual_file());
+    for (const std::string& c : person.complaints()) io.context.warn(c);
+    PersonValues kept = person.values;
+    person.values = chosen(p, io, kept);
+    const PersonValues before = person.values;
+    const bool from_command_line = !io.arguments.empty();
+    // What is no case at all is said without a window.
+    if (from_command_line && !fs::exists(fs::path(io.arguments[0]) / "manifest.json")) static_cast<void>(load_case(io.arguments[0]));
+
+    ShellOptions shown;
+    shown.width = p.width;
+    shown.height = p.height;
+    shown.scale = p.scale;
+    shown.by_hand = person.values.scale;
+    shown.full_screen = person.values.full_screen;
+    shown.two_buffers = p.stereo == StereoMode::quad_buffer;
+    WindowShell shell(shown);
+    bool lost_ticks = false, closed = false, sat = false;
+    Params flags = p;
+    StartOptions start;
+    start.state_file = p.state_file;
+    start.stop = [&] { return io.context.cancelled(); };
+    std::optional<StartChoice> choice;
+    if (from_command_line) choice = StartChoice{io.arguments[0], p.resume};
+    bool chosen_in_window = !from_command_line;
+    while (!closed && !io.context.cancelled()) {
+      if (!choice) {
+        choice = run_start_page(shell, person, start);
+        if (!choice) break;
+      }
+      flags.resume = choice->resume;
+      WindowEnd left;
+      try {
+        std::unique_ptr<OpenCase> open;
+        shell.while_working("the case is opened", io.context,
+                            [&](const Context& context) { open = open_case(choice->case_folder, p, context); });
+        person.opened(open->files.folder);
+        sat = true;
+        lost_ticks = sit(flags, *open, shell, person, io, left) || lost_ticks;
+        closed = !left.another;
+        start.message.clear();
+      } catch (const Error& e) {
+        // One who chose on the page chooses there again.
+        if (!chosen_in_window || e.code() == ExitCode::cancelled) throw;
+        start.message = e.what() + (e.advice().empty() ? std::string() : "; " + e.advice());
+        io.err << start.message << std::endl;
+      }
+      start.folder = fs::absolute(choice->case_folder).parent_path();
+      choice.reset();
+      if (left.dropped) choice = choice_of(*left.dropped, start.message);
+      chosen_in_window = true;
+      flags.out.clear();
+    }
+    person.values.scale = shell.by_hand();
+    keep(before, person.values, kept);
+    person.values = kept;
+    if (const std::string not_kept = person.save(); !not_kept.empty()) io.context.warn(not_kept);
+    if (io.context.cancelled()) throw Error(ExitCode::cancelled, sat ? "ended from outside; the session is saved" : "ended from outside");
+    if (shell.gl_errors() > 0)
+      throw Error(ExitCode::failed, std::to_string(shell.gl_errors()) + " OpenGL errors were seen; the session is saved",
                   "please report this with the name of the graphics card");
-    return static_cast<int>(sitting.lost_ticks() ? ExitCode::partial : ExitCode::ok);
+    return static_cast<int>(lost_ticks ? ExitCode::partial : ExitCode::ok);
   }
 };
 

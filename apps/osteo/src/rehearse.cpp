@@ -37,11 +37,13 @@ int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
   if (!fs::exists(program))
     throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
                 "build with -DOSTEO_WINDOW=ON, or use --headless");
-  std::vector<std::string> args{program.string(), io.arguments[0]};
+  std::vector<std::string> args{program.string()};
+  args.insert(args.end(), io.arguments.begin(), io.arguments.end());
   WindowFlags flags = p, defaults;
   const auto usual = fields_of<WindowFlags>(defaults), given = fields_of<WindowFlags>(flags);
   for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() != usual[i].to_text()) args.push_back(given[i].flag() + "=" + given[i].to_text());
+    if (given[i].to_text() != usual[i].to_text() || io.given.contains(std::string(given[i].doc.name)))
+      args.push_back(given[i].flag() + "=" + given[i].to_text());
   }
   if (io.common.quiet) args.emplace_back("--quiet");
   std::vector<char*> argv;
@@ -62,7 +64,7 @@ cli::CommandInfo RehearseCommand::info() {
           "keep up, "
           "or actions of the script were refused: the summary lists them. Dense bone resists the burr more, by the HU that the case keeps "
           "(\"hardness\": false in --settings turns that off).",
-          {{"case", "a folder made by prepare"}},
+          {{"case", "a folder made by prepare; without one the window opens with a page to choose on", true}},
           "osteo rehearse CASE --headless --seconds 20 -o SESSION"};
 }
 
@@ -87,7 +89,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
          {"device", "arm", "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
       refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
     for (const char* const name :
-         {"quality", "width", "height", "state_file", "scan", "sound", "volume", "alarms", "stereo", "stereo_base", "experiment"})
+         {"quality", "width", "height", "scale", "layout", "full_screen", "end_page", "state_file", "scan", "sound", "volume", "alarms",
+          "stereo", "stereo_base", "experiment"})
       refuse(name, "with --headless", "there is no window; leave it out");
   }
 }
@@ -97,6 +100,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
 int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.show_settings) refuse_what_is_ignored(p, io);
   const int tool = burr_index(p.burr, p.diameter_mm, p.shape);
+  if (io.arguments.empty() && (p.show_settings || p.headless || !p.resume.empty() || !p.out.empty()))
+    throw Error(ExitCode::usage, "osteo rehearse takes <case>", "only the window can be opened without: one is chosen there");
   if (p.show_settings) {
     HapticSetup setup;
     setup.params.contact.method = p.contact;

@@ -114,27 +114,35 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures) {
   drawn_ = {};
 }
 
-void CutsPanel::lay_out(int width, int height, float panel_width) {
-  const auto w = static_cast<float>(width), h = static_cast<float>(height);
-  constexpr float kShare = 290.0F / 1360;
-  const float wish = wished_width_ > 0 ? wished_width_ : kShare * w;
-  const float column = std::clamp(wish, std::min(220.0F, 0.4F * w), std::max(220.0F, 0.5F * (w - panel_width)));
-  column_ = {std::floor(w - column), 0, std::ceil(column), h};
-  middle_ = {panel_width, 0, column_.x - panel_width, h};
-  scene_ = middle_;
+void CutsPanel::lay_out(const RoomLayout& room) {
+  middle_ = scene_ = room.view;
+  header_ = footer_ = {};
+  boxes_ = {};
   // Header above, reading below: at fixed places, whatever they say.
   const ImGuiStyle& style = ImGui::GetStyle();
   const float line = ImGui::GetFontSize() + style.ItemSpacing.y, pad = 2 * style.WindowPadding.y;
   const float top = 4 * (line + 2) + pad - style.ItemSpacing.y, bottom = 2 * line + pad - style.ItemSpacing.y;
-  const float each = std::floor((h - top - bottom) / CutsControl::kCuts);
+  if (!room.column.empty()) {
+    const Box& c = room.column;
+    header_ = {c.x, c.y, c.width, std::min(top, c.height)};
+    footer_ = {c.x, std::max(c.y, c.bottom() - bottom), c.width, std::min(bottom, c.height)};
+    const float each = std::floor((c.height - top - bottom) / CutsControl::kCuts);
+    for (std::size_t n = 0; n < boxes_.size(); ++n) boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
+  } else if (!room.cuts[0].empty()) {
+    boxes_ = room.cuts;
+    Box& first = boxes_.front();
+    header_ = {first.x, first.y, first.width, std::min(top, first.height)};
+    first = {first.x, first.y + header_.height, first.width, first.height - header_.height};
+    Box& last = boxes_.back();
+    footer_ = {last.x, std::max(last.y, last.bottom() - bottom), last.width, std::min(bottom, last.height)};
+    last.height -= footer_.height;
+  }
   for (std::size_t c = 0; c < boxes_.size(); ++c) {
-    Box slot{column_.x, top + static_cast<float>(c) * each, column_.width, each - 2};
-    if (static_cast<int>(c) == control_.enlarged()) {
-      scene_ = slot;
-      slot = middle_;
+    if (static_cast<int>(c) == control_.enlarged() && !header_.empty()) {
+      scene_ = boxes_[c];
+      boxes_[c] = middle_;
     }
-    boxes_[c] = slot;
-    control_.resize(static_cast<int>(c), static_cast<int>(slot.width), static_cast<int>(slot.height));
+    control_.resize(static_cast<int>(c), static_cast<int>(boxes_[c].width), static_cast<int>(boxes_[c].height));
   }
 }
 
@@ -168,6 +176,7 @@ void CutsPanel::take(Rehearsal& rehearsal) {
 void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
   const TickRecord tick = rehearsal.latest();
   control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), normalized(from_floats(tick.device.axis)));
+  if (header_.empty()) return;
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   header(rehearsal);
   mouse_in_ = false;
@@ -180,15 +189,15 @@ void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
 }
 
 void CutsPanel::header(const Rehearsal& rehearsal) {
-  ImGui::SetNextWindowPos({column_.x, 0});
-  ImGui::SetNextWindowSize({column_.width, boxes_[0].y > 0 ? boxes_[0].y : scene_.y});
+  ImGui::SetNextWindowPos({header_.x, header_.y});
+  ImGui::SetNextWindowSize({header_.width, header_.height});
   ImGui::Begin("Cuts", nullptr, kFixed);
   // Its left edge moves.
   const ImVec2 begins = ImGui::GetCursorPos();
   ImGui::SetCursorPos({0, 0});
   ImGui::InvisibleButton("edge", {5, ImGui::GetWindowHeight()});
   if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
-  if (ImGui::IsItemActive()) wished_width_ = column_.width - ImGui::GetIO().MouseDelta.x;
+  if (ImGui::IsItemActive()) wished_width_ = header_.width - ImGui::GetIO().MouseDelta.x;
   ImGui::SetCursorPos(begins);
   static constexpr const char* kShort[] = {"Bone", "Soft", "Temporal"};
   for (int p = 0; p < static_cast<int>(grey_presets().size()); ++p) {
@@ -205,7 +214,7 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
   if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
   ImGui::SameLine();
   const bool along = control_.planes() == CutsControl::Planes::tool;
-  if (small_button("along the drill (G)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  if (small_button("along the drill (F4)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
   ImGui::Checkbox("removed", &shown_.tint_removed);
   if (before_.empty()) shown_.tint_removed = false;
   if (rehearsal.structures() != nullptr) {
@@ -213,7 +222,7 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
     if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
   }
-  ImGui::TextDisabled("%.0f / %.0f HU   W: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
+  ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
   ImGui::End();
 }
 
@@ -244,7 +253,7 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
   const Box box = boxes_[n];
   if (box.width < 8 || box.height < 8) return;
   // Letters and lines grow with the cuts, also where the panels' text does not.
-  const float scale = std::max(scale_now(), column_.width / 360);
+  const float scale = std::max(scale_now(), header_.width / 360);
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
@@ -303,10 +312,8 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
 }
 
 void CutsPanel::readout(const Rehearsal& rehearsal) {
-  const Box& last = control_.enlarged() == CutsControl::kCuts - 1 ? scene_ : boxes_.back();
-  const float y = last.y + last.height + 2;
-  ImGui::SetNextWindowPos({column_.x, y});
-  ImGui::SetNextWindowSize({column_.width, column_.height - y});
+  ImGui::SetNextWindowPos({footer_.x, footer_.y});
+  ImGui::SetNextWindowSize({footer_.width, footer_.height});
   ImGui::Begin("Under the mouse", nullptr, kFixed);
   if (const auto p = control_.under_mouse()) {
     std::string words = place_text(*p) + " mm";
@@ -332,7 +339,7 @@ void CutsPanel::readout(const Rehearsal& rehearsal) {
 void CutsPanel::list_structures(Rehearsal& rehearsal) {
   const StructureMap& map = *rehearsal.structures();
   const float scale = scale_now(), width = std::min(300 * scale, middle_.width);
-  ImGui::SetNextWindowPos({column_.x - width, 0});
+  ImGui::SetNextWindowPos({header_.x - width, header_.y});
   ImGui::SetNextWindowSizeConstraints({width, 0}, {width, 0.8F * middle_.height});
   ImGui::Begin("Structures", &list_open_,
                ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize);

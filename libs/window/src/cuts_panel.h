@@ -8,15 +8,12 @@
 #include "osteo/bone/saw.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/view/structures_view.h"
+#include "room_layout.h"
 
 namespace osteo {
 
 class CutsPanel {
  public:
-  struct Box {
-    float x = 0, y = 0, width = 0, height = 0;
-    [[nodiscard]] bool holds(float px, float py) const { return px >= x && px < x + width && py >= y && py < y + height; }
-  };
   /// With an OpenGL context: makes and frees the textures.
   void create();
   void release();
@@ -25,8 +22,10 @@ class CutsPanel {
   /// A rehearsal has begun. `structures` (may be null) must live until the next call.
   void begin(Rehearsal& rehearsal, StructuresView* structures);
 
-  /// Before the rest of a frame: where things lie, in a window of this size with a panel at its left.
-  void lay_out(int width, int height, float panel_width);
+  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room for neither, not at all.
+  void lay_out(const RoomLayout& room);
+  /// Width of the column as the person dragged it; 0: as the layout has it.
+  [[nodiscard]] float wished_width() const { return wished_width_; }
   /// Where the bone is drawn: the middle, or the place of the cut that has taken it.
   [[nodiscard]] const Box& scene() const { return scene_; }
   /// Between ImGui::NewFrame and Render. `planned`: a saw cut that is being placed; null: none.
@@ -52,8 +51,8 @@ class CutsPanel {
   std::array<std::optional<DrawnCut>, CutsControl::kCuts> drawn_;
   CutsScene shown_;
   std::array<Box, CutsControl::kCuts> boxes_;
-  Box column_, middle_, scene_;
-  float wished_width_ = 0;  // of the column; 0: as the window's width says
+  Box header_, footer_, middle_, scene_;
+  float wished_width_ = 0;
   bool list_open_ = false, mouse_in_ = false;
 };
 

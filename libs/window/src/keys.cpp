@@ -11,17 +11,22 @@ enum : int {
   kSpace = 32,
   kEscape = 256,
   kEnter = 257,
+  kTab = 258,
   kBackspace = 259,
   kDown = 264,
   kUp = 265,
   kHome = 268,
   kF1 = 290,
+  kF2 = 291,
   kF3 = 292,
   kF4 = 293,
   kF5 = 294,
   kF6 = 295,
   kF7 = 296,
   kF8 = 297,
+  kF9 = 298,
+  kF10 = 299,
+  kF11 = 300,
   kKeypad2 = 322,
   kKeypad4 = 324,
   kKeypad6 = 326,
@@ -75,7 +80,7 @@ constexpr Key kKeys[] = {
     {',', Command::focus, Key::When::repeated, -1},
     {'.', Command::focus, Key::When::repeated, 1},
     {'/', Command::autofocus},
-    {'W', Command::look_there},
+    {';', Command::look_there},
     {'G', Command::look_at_drill},
     {'O', Command::guide_camera, Key::When::held},
     {kF6, Command::bookmark, Key::When::pressed, 0},
@@ -87,6 +92,12 @@ constexpr Key kKeys[] = {
     {kKeypad8, Command::orbit_up, Key::When::held},
     {kKeypad2, Command::orbit_down, Key::When::held},
     {'K', Command::second_hand},
+    {kF2, Command::layout},
+    {kF11, Command::full_screen},
+    {kF10, Command::panel_keys},
+    {kTab, Command::wheel},
+    {kF9, Command::ruler},
+    {'W', Command::before},
 };
 
 bool has(const std::vector<Command>& list, Command c) {
@@ -104,6 +115,20 @@ const Key* find_key(int code) {
   return at == std::end(kKeys) ? nullptr : at;
 }
 
+std::string key_name(Command command) {
+  static const std::pair<int, const char*> kNames[] = {{kSpace, "Space"}, {kEscape, "Esc"}, {kEnter, "Enter"}, {kTab, "Tab"},
+                                                       {kDown, "Down"},   {kUp, "Up"},      {kHome, "Home"}};
+  for (const Key& key : kKeys) {
+    if (key.command != command) continue;
+    for (const auto& [code, name] : kNames) {
+      if (code == key.code) return name;
+    }
+    if (key.code >= kF1 && key.code < kF1 + 12) return "F" + std::to_string(key.code - kF1 + 1);
+    if (key.code > kSpace && key.code < 127) return {static_cast<char>(key.code)};
+  }
+  return {};
+}
+
 const std::vector<HelpLine>& help_lines() {
   using enum Command;
   static const std::vector<HelpLine> lines = {{"move", "moves the drill across the view", {}},
@@ -116,6 +141,7 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
                                               {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
                                               {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
+                                              {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},
                                               {"V, I", "a sucker, or water, beside the burr", {suck, wash}},
                                               {"X", "saw: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
                                               {"P", "pieces: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
@@ -124,14 +150,20 @@ const std::vector<HelpLine>& help_lines() {
                                               {"Enter", "cut; take apart; fix the plate", {perform}},
                                               {"Z", "takes back the last stroke, cut, move, plate", {undo}},
                                               {"Esc", "back to the drill", {put_away}},
-                                              {"M", "marks this moment in the session", {mark}},
-                                              {"S", "screenshot into the session's folder", {screenshot}},
-                                              {"F5", "save the session and go on", {save}},
-                                              {"R", "save the session, the bone is whole again", {reset}},
+                                              {"W", "the bone as it was at the beginning, and as it is", {before}},
+                                              {"F9", "ruler: two points on the bone, by clicks", {ruler}},
+                                              {"M", "note pinned to the bone under the mouse; without text: marks this moment", {mark}},
+                                              {"S", "screenshot with its caption into the session's folder", {screenshot}},
+                                              {"F5", "saves the session and goes on", {save}},
+                                              {"R", "asks; saves the session, and the bone is whole again", {reset}},
                                               {"Home", "view from the left", {home}},
                                               {"N", "sound on and off", {sound}},
+                                              {"F2", "layout: panel and cuts beside, picture alone, four pictures", {layout}},
+                                              {"F10", "keys move in the panel: arrows, Space; Esc gives them back", {panel_keys}},
+                                              {"F11", "full screen, and back", {full_screen}},
+                                              {"Ctrl +, Ctrl -, Ctrl 0", "size of text and panels; as the monitor has it", {}},
                                               {"F1, H", "shows this, and hides it", {help}},
-                                              {"Q", "save and close", {quit}},
+                                              {"Q", "saves, ends the session and shows what was done", {quit}},
                                               {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
                                               {"F3", "a cut takes the middle, and back", {cut_in_middle}},
                                               {"F4", "cuts along the tool, or along the body", {cuts_along_tool}},
@@ -142,12 +174,12 @@ const std::vector<HelpLine>& help_lines() {
                                               {"cuts: middle drag, double click", "moves it; takes the middle, and back", {}},
                                               {"[, ]", "magnification, by its steps", {magnify}},
                                               {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
-                                              {"W", "looks at the bone under the mouse", {look_there}},
+                                              {"; (semicolon)", "looks at the bone under the mouse", {look_there}},
                                               {"G", "looks at the drill; with Shift along it", {look_at_drill}},
                                               {"O", "mouse or device move the camera; with Shift turn it", {guide_camera}},
                                               {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
                                               {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
-                                              {"Backspace", "takes back the camera's last move", {camera_back}}},
+                                              {"Backspace", "takes back the camera's last move", {camera_back}},
                                               {"K", "second hand: sucker, water, probe, nothing", {second_hand}}};
   return lines;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace osteo {
@@ -53,6 +54,12 @@ enum class Command {
   orbit_up,
   orbit_down,
   second_hand,
+  layout,
+  full_screen,
+  panel_keys,
+  wheel,
+  ruler,
+  before,
 };
 
 struct Key {
@@ -63,6 +70,9 @@ struct Key {
 };
 [[nodiscard]] std::span<const Key> key_table();
 [[nodiscard]] const Key* find_key(int code);
+
+/// The first key that does it, as people call it: "F", "Space", "F10"; empty: none.
+[[nodiscard]] std::string key_name(Command command);
 
 /// A line of the window's help, and the commands it tells of; none: of the mouse.
 struct HelpLine {

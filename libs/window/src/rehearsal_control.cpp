@@ -71,6 +71,14 @@ void RehearsalControl::reset() {
   if (begin(true, true)) say("the bone is whole again; the session before was saved");
 }
 
+bool RehearsalControl::end() {
+  leading_.reset();
+  const bool saved = guarded([&] { actions_.save(); });
+  if (!saved) lost_ = failure_;
+  ran_ = latched_ = sucking_ = washing_ = false;
+  return saved;
+}
+
 void RehearsalControl::watch() {
   const Rehearsal* const running = actions_.rehearsal();
   if (running == nullptr || failure_) return;
@@ -287,10 +295,6 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       return true;
     case Command::taper:
       take_burr(BurrShape::taper);
-      return true;
-    case Command::mark:
-      rehearsal().note("mark", "{}");
-      say("marked");
       return true;
     case Command::save:
       save();

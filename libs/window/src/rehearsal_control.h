@@ -34,6 +34,7 @@ class RehearsalControl {
   bool begin(bool from_case, bool save_first);
   void save();   ///< and goes on from there
   void reset();  ///< saves, and begins with the case's bone
+  bool end();    ///< saves; nothing runs then. False: it could not be saved, failure() says why
   /// Each frame: what can no longer be recorded is ended; a rehearsal that has ended without having been asked to says why.
   void watch();
   /// Why nothing runs.

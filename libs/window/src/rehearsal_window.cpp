@@ -4,32 +4,27 @@
 #include <vtk_glew.h>
 
 #include <GLFW/glfw3.h>
-#include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
-#include <vtkActor.h>
 #include <vtkGenericOpenGLRenderWindow.h>
-#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
-#include <vtkPolyData.h>
-#include <vtkPolyDataMapper.h>
-#include <vtkProperty.h>
 #include <vtkRenderer.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <optional>
 #include <utility>
 
+#include "before_view.h"
 #include "camera_notes.h"
 #include "cuts_panel.h"
 #include "gamepad.h"
-#include "help_panel.h"
-#include "open_window.h"
 #include "osteo/base/error.h"
+#include "osteo/bone/world_mesh.h"
 #include "osteo/grid/brick_places.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/view/actors.h"
@@ -39,12 +34,10 @@
 #include "osteo/view/structures_view.h"
 #include "osteo/view/world_view.h"
 #include "rehearsal_control.h"
+#include "room.h"
 #include "scene_painter.h"
 #include "scene_tools.h"
 #include "scope_panel.h"
-#include "settings_panel.h"
-#include "sound_panel.h"
-#include "status_panel.h"
 #include "stereo_screen.h"
 #include "trial_overlay.h"
 #include "window_state.h"
@@ -52,27 +45,30 @@
 namespace osteo {
 namespace {
 
-constexpr int kPanelWidth = 270;
-
 class RehearsalWindow {
  public:
-  RehearsalWindow(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound)
-      : control_(actions, options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
+  RehearsalWindow(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
+                  const WindowActions& actions, SoundOut& sound)
+      : shell_(shell),
+        room_(shell, person),
+        control_(working(actions), options.tool, [this](Rehearsal& rehearsal) { show_bone(rehearsal); }),
         actions_(actions),
         sound_(sound),
         scan_(options.scan),
         approval_(options.approval),
         approval_ended_(options.approval_ended),
         state_file_(options.state_file),
-        device_name_(options.device) {
+        device_name_(options.device),
+        case_hash_(options.case_hash),
+        end_page_(options.end_page),
+        window_(shell.window()) {
     cuts_.set_case(options.ct, hu, options.bone);
     stereo_.params = options.stereo;
-    open(options);
+    open();
     painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);
     painter_->quality().want(options.quality);
     make_scene();
     scope_.overview(StandardView::left, scope_scene(), false);
-    show_words("loading the case");
     control_.look_from(view_axes());
     control_.begin(options.from_case, false);
     scope_.overview(StandardView::left, scope_scene(), false);
@@ -80,38 +76,47 @@ class RehearsalWindow {
   }
 
   ~RehearsalWindow() {
-    glfwMakeContextCurrent(window_);
+    shell_.on_key = nullptr;
+    // The session is the caller's to save, and goes on until then.
+    if (Rehearsal* const rehearsal = actions_.rehearsal(); rehearsal != nullptr && work_) rehearsal->remove_reader(*work_);
     cuts_.release();
     structures_.reset();
     stereo_.release();
     for (auto& hand : hands_) hand.reset();
     tools_.reset();
+    before_view_.reset();
     world_view_.reset();
     render_window_->Finalize();
-    ImGui_ImplOpenGL3_Shutdown();
-    ImGui_ImplGlfw_Shutdown();
-    ImGui::DestroyContext();
-    glfwDestroyWindow(window_);
-    glfwTerminate();
   }
   RehearsalWindow(const RehearsalWindow&) = delete;
   RehearsalWindow& operator=(const RehearsalWindow&) = delete;
 
-  int run() {
+  WindowEnd run() {
     if (control_.failure()) throw Error(*control_.failure());  // nothing was begun
-    while (glfwWindowShouldClose(window_) == 0 && !quit_ && !actions_.stop()) frame();
+    while (!shell_.closing() && !quit_ && !actions_.stop()) frame();
     if (control_.failure()) throw Error(*control_.failure());
     if (control_.lost()) throw Error(*control_.lost());
-    return gl_errors_;
+    return end_;
   }
 
  private:
   // --- set-up -----------------------------------------------------------------------------------------------------
 
-  void open(const WindowOptions& options) {
-    window_ = open_window(options.title, options.width, options.height, "is there a display? Without one: osteo rehearse CASE --headless",
-                          options.stereo.mode == StereoMode::quad_buffer);
+  // A session is begun and saved in a thread of its own: meanwhile the window says so, and answers.
+  WindowActions working(WindowActions actions) {
+    actions.begin = [this, begin = actions.begin](bool from_case, const HandView& view) {
+      HandGoal goal;
+      shell_.while_working(from_case ? "the bone is made ready" : "the session is made ready", {},
+                           [&](const Context&) { goal = begin(from_case, view); });
+      return goal;
+    };
+    actions.save = [this, save = actions.save, rehearsal = actions.rehearsal] {
+      if (rehearsal() != nullptr) shell_.while_working("the session is saved", {}, [&](const Context&) { save(); });
+    };
+    return actions;
+  }
 
+  void open() {
     render_window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
     render_window_->SetOwnContext(0);
     render_window_->SetIsCurrent(true);
@@ -119,19 +124,10 @@ class RehearsalWindow {
     render_window_->SetMultiSamples(0);
     render_window_->OpenGLInitContext();
     render_window_->AddRenderer(renderer_);
-
-    // ImGui chains this callback behind its own.
-    glfwSetWindowUserPointer(window_, this);
-    glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int mods) {
-      static_cast<RehearsalWindow*>(glfwGetWindowUserPointer(w))
-          ->keyboard_.on(key, static_cast<Keyboard::Event>(action), (mods & GLFW_MOD_SHIFT) != 0);
-    });
-    ImGui::CreateContext();
-    ImGui::GetIO().IniFilename = nullptr;
-    ImGui::StyleColorsDark();
-    ImGui::GetStyle().WindowRounding = 0;
-    ImGui_ImplGlfw_InitForOpenGL(window_, true);
-    ImGui_ImplOpenGL3_Init("#version 150");
+    shell_.on_key = [this](int key, int action, bool shift) {
+      if (action == 1) room_.key(key);
+      keyboard_.on(key, static_cast<Keyboard::Event>(action), shift);
+    };
     cuts_.create();
   }
 
@@ -148,6 +144,11 @@ class RehearsalWindow {
     if (!structures_ && rehearsal.structures() != nullptr)  // the same in all sessions
       structures_ = std::make_unique<StructuresView>(renderer_, *rehearsal.structures());
     cuts_.begin(rehearsal, structures_.get());
+    before_view_.reset();
+    room_.renew();
+    work_ = std::make_unique<WorkDone>();  // the session that the last one followed is over
+    rehearsal.add_reader(*work_);
+    ended_.reset();
   }
 
   // --- the view ---------------------------------------------------------------------------------------------------
@@ -189,47 +190,48 @@ class RehearsalWindow {
   // --- one frame --------------------------------------------------------------------------------------------------
 
   void frame() {
-    glfwPollEvents();
-    measure_window();
+    const bool seen = shell_.poll();
+    width_ = shell_.width();
+    height_ = shell_.height();
+    for (const auto& path : shell_.take_dropped()) {
+      end_ = {true, path};
+      quit_ = true;
+    }
     control_.watch();
     control_.look_from(view_axes());
-    if (width_ < 200 || height_ < 150) {  // put away
+    if (!seen) {  // put away
       write_state();
       glfwWaitEventsTimeout(0.05);
       return;
     }
-    begin_picture();
+    lay_out();
+    shell_.new_frame();
     if (control_.failure()) {
       tell_failure();
+    } else if (ended_) {
+      show_end();
     } else {
       mouse_and_keys();
-      if (!control_.failure()) show();
+      if (!control_.failure() && !ended_) show();
     }
     end_picture();
     ++pictures_;
     write_state();
   }
 
-  void measure_window() {
-    glfwGetFramebufferSize(window_, &width_, &height_);
-    cuts_.lay_out(width_, height_, kPanelWidth);
-    const CutsPanel::Box& scene = cuts_.scene();
+  void lay_out() {
+    cuts_.lay_out(room_.lay_out(ended_.has_value(), cuts_.wished_width()));
+    const Box& scene = cuts_.scene();
     scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y), std::max(1.0, static_cast<double>(scene.width)),
                    std::max(1.0, static_cast<double>(scene.height))};
   }
 
-  void begin_picture() {
-    ImGui_ImplOpenGL3_NewFrame();
-    ImGui_ImplGlfw_NewFrame();
-    ImGui::NewFrame();
-  }
-
   void show() {
-    panel();
-    if (control_.failure()) return;
     Rehearsal& now = control_.rehearsal();
+    const RoomScene scene = room_scene(now);
+    room_.draw(scene);
+    if (screenshot_wanted_) room_.draw_caption(scene);
     cuts_.draw(now, control_.tools().tool() == HandTools::Tool::saw ? &control_.tools().cut() : nullptr);
-    if (show_help_) draw_help(show_help_, width_);
     now.look([&](const World& world, SceneReaders& readers) {
       world_view_->update(world, readers);
       if (now.soft() != nullptr) world_view_->update_soft(*now.soft());
@@ -238,7 +240,7 @@ class RehearsalWindow {
     const TickRecord tick = now.latest();
     show_instruments(now);
     now.look([&](const World& world, SceneReaders&) { tools_->show(control_.tools(), tick, world); });
-    control_.wash(keyboard_.held(Command::suck), keyboard_.held(Command::wash));
+    control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck), keyboard_.held(Command::wash) || room_.holds(Command::wash));
     note_camera(now);
   }
 
@@ -255,6 +257,7 @@ class RehearsalWindow {
     const PictureArea& area = scope_.area;
     renderer_->SetViewport(area.x / width_, 1 - (area.y + area.height) / height_, (area.x + area.width) / width_, 1 - area.y / height_);
     aim(renderer_, scope_.view(), area);
+    if (before_view_) before_view_->place(renderer_, room_.before());
     renderer_->ResetCameraClippingRange();
     const bool scene = world_view_ && !control_.failure(), two_eyes = scene && stereo_.on();
     if (scene) draw_scope(scope_.view(), area, stereo_.params.mode);
@@ -278,9 +281,9 @@ class RehearsalWindow {
       if (!two_eyes) painter_->show();
     });
     if (screenshot_wanted_) save_screenshot();
-    for (GLenum e = glGetError(); e != GL_NO_ERROR && gl_errors_ < 1000; e = glGetError()) ++gl_errors_;
+    shell_.count_gl_errors();
     glfwSwapBuffers(window_);
-    painter_->done();
+    if (!two_eyes) painter_->done();
   }
 
   [[nodiscard]] static bool input() {
@@ -289,22 +292,90 @@ class RehearsalWindow {
            !io.InputQueueCharacters.empty();
   }
 
-  // While there is nothing else to see.
-  void show_words(const char* words) {
-    glfwPollEvents();
-    measure_window();
-    begin_picture();
-    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 100, static_cast<float>(height_) / 2 - 20});
-    ImGui::Begin("words", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
-    ImGui::Text("%s", words);
-    ImGui::End();
-    end_picture();
+  [[nodiscard]] RoomScene room_scene(Rehearsal& now) {
+    MachineFacts machine;
+    machine.device = device_name_;
+    machine.drawn_millions = static_cast<double>(world_view_->drawn_triangles()) / 1e6;
+    machine.triangles_millions = static_cast<double>(world_view_->triangles()) / 1e6;
+    machine.scan = &scan_;
+    machine.approval = approval_;
+    machine.approval_ended = approval_ended_;
+    machine.case_hash = case_hash_;
+    machine.pictures = painter_->words();
+    return {control_,
+            sound_,
+            now.latest(),
+            machine,
+            scope_.view().pixels_per_mm(scope_.area),
+            [this](Vec3 at) { return project(at); },
+            [this] { draw_scope_panel(scope_, stereo_, scope_scene()); },
+            [this, &now] { tools_->panel(control_.tools(), now, view_axes()); }};
+  }
+
+  // A point of the world in pixels of the window, from its upper left corner.
+  [[nodiscard]] std::optional<std::array<float, 2>> project(Vec3 at) const {
+    const auto p = scope_.view().pixel(at, scope_.area);
+    return p ? std::optional(std::array<float, 2>{static_cast<float>((*p)[0]), static_cast<float>((*p)[1])}) : std::nullopt;
+  }
+
+  // The bone as it was: made when it is first asked for, kept while the session runs. Between two frames.
+  void show_before(bool on) {
+    room_.set_before(on);
+    if (!on || before_view_) return;
+    if (!actions_.world_at_begin) {
+      room_.set_before(false);
+      control_.say("how the bone was is not known");
+      return;
+    }
+    try {
+      TriMesh mesh;
+      shell_.while_working("the bone as it was is made", {},
+                           [&](const Context& context) { mesh = surface_of(actions_.world_at_begin(context), context); });
+      before_view_ = std::make_unique<BeforeView>(render_window_, mesh);
+    } catch (const Error& e) {
+      room_.set_before(false);
+      control_.say(e.what());
+    }
+  }
+
+  // The session is saved; what was done is shown beside the bone as it was left.
+  void end_session() {
+    if (!end_page_ || !actions_.facts) {
+      quit_ = true;
+      return;
+    }
+    room_.set_before(false);
+    if (!control_.end()) return;
+    ended_ = end_facts(actions_.facts(), *work_);
+  }
+
+  void show_end() {
+    camera_by_mouse();
+    EndChoice choice = room_.draw_end(*ended_);
+    for (const Keyboard::Press& press : keyboard_.frame(ImGui::GetIO().WantTextInput)) {
+      if (choice == EndChoice::none) choice = Room::end_choice(press.command);
+      if (press.command == Command::screenshot) screenshot_wanted_ = true;
+      if (press.command == Command::full_screen) shell_.toggle_full_screen();
+    }
+    if (choice == EndChoice::another) end_.another = true;
+    if (choice == EndChoice::close || choice == EndChoice::another) quit_ = true;
+    if (choice == EndChoice::again || choice == EndChoice::resume) begin_again(choice == EndChoice::again);
+  }
+
+  // ImGui's frame is put aside meanwhile: what shows that it works needs one of its own.
+  void begin_again(bool from_case) {
+    ImGui::EndFrame();
+    const bool begun = control_.begin(from_case, false);
+    ended_.reset();  // failure() speaks for itself
+    if (begun) control_.say(from_case ? "the bone is whole again" : "a new session goes on from what was recorded");
+    shell_.new_frame();
   }
 
   // What failed, what is kept, and what can be done now. Nothing runs.
   void tell_failure() {
-    ImGui::SetNextWindowPos({static_cast<float>(width_) / 2 - 240, static_cast<float>(height_) / 3});
-    ImGui::SetNextWindowSize({480, 0});
+    const float wide = std::min(static_cast<float>(width_), 30 * ImGui::GetFontSize());
+    ImGui::SetNextWindowPos({(static_cast<float>(width_) - wide) / 2, static_cast<float>(height_) / 3});
+    ImGui::SetNextWindowSize({wide, 0});
     ImGui::Begin("No session runs", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
     ImGui::TextWrapped("%s", control_.failure()->what());
     if (!control_.failure()->advice().empty()) ImGui::TextWrapped("%s", control_.failure()->advice().c_str());
@@ -321,8 +392,7 @@ class RehearsalWindow {
       quit_ = quit_ || press.command == Command::quit;
       screenshot_wanted_ = screenshot_wanted_ || press.command == Command::screenshot;
     }
-    if ((go_on || anew) && control_.begin(anew, false))
-      control_.say(anew ? "the bone is whole again" : "a new session goes on from what was recorded");
+    if (go_on || anew) begin_again(anew);
   }
 
   void show_instruments(Rehearsal& now) {
@@ -340,41 +410,83 @@ class RehearsalWindow {
     });
   }
 
+  [[nodiscard]] ScopeMouse mouse() const {
+    const ImGuiIO& io = ImGui::GetIO();
+    const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+    return {x,
+            y,
+            static_cast<double>(io.MouseDelta.x),
+            static_cast<double>(io.MouseDelta.y),
+            static_cast<double>(io.MouseWheel),
+            ImGui::IsMouseDragging(ImGuiMouseButton_Right),
+            ImGui::IsMouseDragging(ImGuiMouseButton_Middle),
+            io.KeyCtrl,
+            io.KeyShift};
+  }
+  // Where there is no hand to move.
+  void camera_by_mouse() {
+    const ImGuiIO& io = ImGui::GetIO();
+    const auto seconds = static_cast<double>(io.DeltaTime);
+    if (cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !io.WantCaptureMouse) scope_.mouse(mouse(), false, seconds);
+    scope_.advance(keyboard_, io.KeyShift, {}, seconds);
+  }
+
   void mouse_and_keys() {
     const ImGuiIO& io = ImGui::GetIO();
-    const ImVec2 m = io.MousePos;
-    const bool in_view = cuts_.scene().holds(m.x, m.y) && !show_help_;
-    const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(m.x), static_cast<double>(m.y));
+    const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !room_.in_front();
     const auto seconds = static_cast<double>(io.DeltaTime);
     const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
     scope_.lend(keyboard_.held(Command::guide_camera) || devices.pedal);
+    const ScopeMouse m = mouse();
+    bool measured = false;
     if (in_view && !io.WantCaptureMouse) {
-      const ScopeMouse mouse{x,
-                             y,
-                             static_cast<double>(io.MouseDelta.x),
-                             static_cast<double>(io.MouseDelta.y),
-                             static_cast<double>(io.MouseWheel),
-                             ImGui::IsMouseDragging(ImGuiMouseButton_Right),
-                             ImGui::IsMouseDragging(ImGuiMouseButton_Middle),
-                             io.KeyCtrl,
-                             io.KeyShift};
-      if (!scope_.mouse(mouse, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(mouse);
+      if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = room_.click(bone_seen(ray(m.x, m.y)), control_);
+      if (!measured && !scope_.mouse(m, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(m);
     }
     control_.look_from(view_axes());  // the mouse may have turned it
-    const std::optional<Vec3> direction = in_view ? std::optional(ray(x, y)) : std::nullopt;
-    for (const Keyboard::Press& press : keyboard_.frame(io.WantTextInput)) {
-      std::string said;
-      if (scope_.key(press, scope_scene(), direction, said)) {
-        if (!said.empty()) control_.say(said);
-      } else if (!control_.command(press, direction)) {
-        command(press.command);
-      }
-      if (control_.failure()) return;
+    const std::optional<Vec3> direction = in_view ? std::optional(ray(m.x, m.y)) : std::nullopt;
+    std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.writing());
+    for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
+    for (const Keyboard::Press& press : presses) {
+      do_press(press, direction);
+      if (control_.failure() || ended_ || quit_) return;
     }
     scope_.advance(keyboard_, io.KeyShift, devices, seconds);
     control_.look_from(view_axes());
     if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv")) control_.say(*said);
-    control_.hold({seconds, ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent(), in_view && !io.WantCaptureMouse, read_gamepad()});
+    const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
+    control_.hold({seconds, ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent(), may_drill, read_gamepad()});
+  }
+
+  void do_press(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
+    // What begins or ends a session shows pictures of its own.
+    const bool long_work = press.command == Command::save || press.command == Command::quit || press.command == Command::perform ||
+                           press.command == Command::before;
+    if (long_work) ImGui::EndFrame();
+    const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
+    if (press.command == Command::before) {
+      show_before(!room_.before());
+    } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) && !control_.command(press, direction)) {
+      command(press.command);
+    }
+    if (long_work) shell_.new_frame();
+  }
+
+  bool camera_takes(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
+    std::string said;
+    if (!scope_.key(press, scope_scene(), direction, said)) return false;
+    if (!said.empty()) control_.say(said);
+    return true;
+  }
+
+  [[nodiscard]] std::optional<Vec3> bone_seen(const std::optional<Vec3>& direction) {
+    if (!direction) return std::nullopt;
+    std::optional<BoneHit> hit;
+    const ViewAxes view = view_axes();
+    control_.rehearsal().look([&](const World& world, SceneReaders&) {
+      hit = bone_on_ray(world, view.eye_mm, *direction, length(control_.centre_mm() - view.eye_mm) + 4 * control_.radius_mm());
+    });
+    return hit ? std::optional(hit->at_mm) : std::nullopt;
   }
 
   // The mouse is the hand, or what the hand's tool is moved by.
@@ -407,7 +519,6 @@ class RehearsalWindow {
   // What is the window's own.
   void command(Command command) {
     if (command == Command::screenshot) screenshot_wanted_ = true;
-    if (command == Command::help) show_help_ = !show_help_;
     if (command == Command::sound) sound_.turn(!sound_.on());
     if (command == Command::quality) {
       QualityChoice& q = painter_->quality();
@@ -418,7 +529,7 @@ class RehearsalWindow {
       const bool along = cuts_.control().planes() == CutsControl::Planes::tool;
       cuts_.control().take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
     }
-    if (command == Command::quit) quit_ = true;
+    if (command == Command::quit) end_session();
   }
 
   void save_screenshot() {
@@ -446,68 +557,6 @@ class RehearsalWindow {
     }
   }
 
-  // --- panel, slices, help ------------------------------------------------------------------------------------------
-
-  void panel() {
-    Rehearsal& rehearsal = control_.rehearsal();
-    const TickRecord tick = rehearsal.latest();
-    ImGui::SetNextWindowPos({0, 0});
-    ImGui::SetNextWindowSize({static_cast<float>(kPanelWidth), static_cast<float>(height_)});
-    ImGui::Begin("Rehearsal", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-    ImGui::Text("Burr");
-    const Burr& burr = burr_library()[static_cast<std::size_t>(control_.tool())];
-    if (ImGui::RadioButton("cutting (C)", burr.kind == BurrKind::cutting)) control_.take_burr(BurrKind::cutting);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("diamond (D)", burr.kind == BurrKind::diamond)) control_.take_burr(BurrKind::diamond);
-    if (ImGui::RadioButton("ball (B)", burr.shape == BurrShape::ball)) control_.take_burr(BurrShape::ball);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("cyl. (Y)", burr.shape == BurrShape::cylinder)) control_.take_burr(BurrShape::cylinder);
-    ImGui::SameLine();
-    if (ImGui::RadioButton("taper (T)", burr.shape == BurrShape::taper)) control_.take_burr(BurrShape::taper);
-    int diameter = static_cast<int>(burr.diameter_mm);
-    if (ImGui::SliderInt("mm (1-7)", &diameter, 1, 7)) control_.take_burr_of(diameter);
-    if (bool on = control_.latched(); ImGui::Checkbox("drill on (left button, Space)", &on)) control_.latch(on);
-    ImGui::Separator();
-    tools_->panel(control_.tools(), rehearsal, view_axes());
-    ImGui::Separator();
-    if (ImGui::Button("Drill to bone under mouse (F)", {-1, 0})) control_.say("point at the bone and press F");
-    if (ImGui::Button("Lift the drill out (U)", {-1, 0})) control_.lift();
-    if (ImGui::Button("Screenshot (S)", {-1, 0})) screenshot_wanted_ = true;
-    const bool saves = ImGui::Button("Save and go on (F5)", {-1, 0});
-    ImGui::Dummy({0, 6});
-    const bool resets = ImGui::Button("Reset the bone (R)", {-1, 0});
-    ImGui::Separator();
-    draw_scope_panel(scope_, stereo_, scope_scene());
-    ImGui::Separator();
-    draw_status(rehearsal, tick);  // below the buttons, which its lines would move
-    draw_sound(sound_);
-    draw_settings(rehearsal);
-    draw_posture(rehearsal);
-    ImGui::Separator();
-    ImGui::Text("hand: %s", device_name_.c_str());
-    ImGui::Text("%s", rehearsal.realtime() ? "real-time priority: yes" : "real-time priority: REFUSED");
-    if (!rehearsal.realtime()) ImGui::TextWrapped("The force may stutter. Run as root, or allow rtprio in limits.conf.");
-    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(tick.work_us), static_cast<double>(tick.lateness_us));
-    ImGui::Text("%.2f of %.2f M triangles", static_cast<double>(world_view_->drawn_triangles()) / 1e6,
-                static_cast<double>(world_view_->triangles()) / 1e6);
-    ImGui::TextUnformatted(painter_->words().c_str());
-    ImGui::Separator();
-    draw_approval(approval_, approval_ended_);
-    draw_scan(scan_);
-    ImGui::TextWrapped("F1: mouse and keys");
-    if (const std::string told = control_.told(); !told.empty()) {
-      ImGui::Separator();
-      ImGui::TextWrapped("%s", told.c_str());
-    }
-    ImGui::End();
-    // Last: the rehearsal is another one afterwards.
-    if (saves) {
-      control_.save();
-    } else if (resets) {
-      control_.reset();
-    }
-  }
-
   // For tests: what can be seen, as numbers. Whole at any moment.
   void write_state() {
     if (state_file_.empty()) return;
@@ -523,7 +572,8 @@ class RehearsalWindow {
     state.session = actions_.folder();
     state.tool = burr_library()[static_cast<std::size_t>(control_.tool())].name();
     state.drill_latched = control_.latched();
-    state.help = show_help_;
+    state.help = room_.help();
+    state.room = room_state();
     state.sucking = control_.sucking();
     state.washing = control_.washing();
     state.sound = sound_.on();
@@ -556,6 +606,28 @@ class RehearsalWindow {
     write_window_state(state, state_file_);
   }
 
+  [[nodiscard]] RoomState room_state() const {
+    RoomState r;
+    r.layout = EnumNames<Layout>::values[static_cast<std::size_t>(room_.layout().shown)];
+    r.em_pixels = shell_.em_pixels();
+    r.full_screen = shell_.full_screen();
+    r.asking = room_.asking();
+    r.wheel = room_.wheel_open();
+    r.panel_keys = room_.keys_in_panel();
+    r.before = room_.before() && before_view_;
+    r.writing = room_.writing();
+    r.ended = ended_.has_value();
+    r.ruler = room_.ruler().on();
+    r.ruler_mm = room_.ruler().length_mm().value_or(0);
+    r.notes = room_.notes().all().size();
+    for (const Step& s : room_.steps().steps()) r.steps_done += s.done ? 1 : 0;
+    const Box& v = cuts_.scene();
+    r.view = {v.x, v.y, v.width, v.height};
+    return r;
+  }
+
+  WindowShell& shell_;
+  Room room_;
   RehearsalControl control_;
   WindowActions actions_;
   SoundOut& sound_;
@@ -563,8 +635,10 @@ class RehearsalWindow {
   const std::string approval_;
   const bool approval_ended_;
   std::filesystem::path state_file_;
-  GLFWwindow* window_ = nullptr;
-  int width_ = 0, height_ = 0;
+  std::unique_ptr<BeforeView> before_view_;
+  std::unique_ptr<WorkDone> work_;
+  std::optional<EndFacts> ended_;
+  WindowEnd end_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> render_window_;
   vtkNew<vtkRenderer> renderer_;
   std::array<std::unique_ptr<InstrumentView>, kMostHands> hands_;
@@ -573,10 +647,12 @@ class RehearsalWindow {
   std::unique_ptr<StructuresView> structures_;
   std::unique_ptr<SceneTools> tools_;
   CutsPanel cuts_;
-  std::string device_name_;
-  int gl_errors_ = 0;
+  std::string device_name_, case_hash_;
+  bool end_page_;
+  GLFWwindow* window_;
+  int width_ = 0, height_ = 0;
   std::uint64_t pictures_ = 0;
-  bool show_help_ = false, screenshot_wanted_ = false, quit_ = false;
+  bool screenshot_wanted_ = false, quit_ = false;
   Keyboard keyboard_;
   ScopeInput scope_;
   StereoScreen stereo_;
@@ -586,8 +662,9 @@ class RehearsalWindow {
 
 }  // namespace
 
-int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound) {
-  return RehearsalWindow(options, hu, actions, sound).run();
+WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
+                               const WindowActions& actions, SoundOut& sound) {
+  return RehearsalWindow(shell, person, options, hu, actions, sound).run();
 }
 
 }  // namespace osteo

@@ -110,12 +110,10 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   }
   std::vector<Fixture> fixtures;
   std::vector<double> in_bone_mm;
-  std::size_t steps = 0;
   rehearsal.look([&](const World& world, SceneReaders&) {
     fixtures = world.fixtures();
     for (const Fixture& f : fixtures)
       in_bone_mm.push_back(plate_in_bone_mm(world, plate_library()[f.plate], pose_of(world, f), f.opening_mm));
-    steps = world.undo_steps();
   });
   for (const Fixture& f : fixtures) {
     const PlateModel& model = plate_library()[f.plate];
@@ -131,7 +129,6 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     }
     ImGui::PopID();
   }
-  if (steps > 0 && ImGui::Button("Undo (Z)")) tools.undo(rehearsal);
   if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
 }
 

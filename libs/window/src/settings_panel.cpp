@@ -56,7 +56,7 @@ void draw_settings(Rehearsal& rehearsal) {
   if (!ImGui::CollapsingHeader("How it feels")) return;
   HapticsParams params = rehearsal.settings();
   const auto fields = fields_of<HapticsParams>(params);
-  ImGui::PushItemWidth(70);
+  ImGui::PushItemWidth(4.5F * ImGui::GetFontSize());
   for (std::size_t n = 0; n < fields.size(); ++n) {
     if (draw_field(fields[n]))
       rehearsal.act(SceneAction::setting(static_cast<std::uint32_t>(n), setting_value(static_cast<int>(n), params)));

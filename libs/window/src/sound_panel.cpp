@@ -12,7 +12,7 @@ void draw_sound(SoundOut& sound) {
   if (ImGui::Checkbox("alarms", &alarms)) sound.set_alarms(alarms);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("beeps where a structure at risk is touched");
   auto volume = static_cast<float>(sound.volume());
-  ImGui::PushItemWidth(-70);
+  ImGui::PushItemWidth(-4.5F * ImGui::GetFontSize());
   if (ImGui::SliderFloat("volume", &volume, 0, 1, "%.2f")) sound.set_volume(static_cast<double>(volume));
   ImGui::PopItemWidth();
 }

@@ -66,7 +66,21 @@ void write_window_state(const WindowState& s, const std::filesystem::path& file)
                                  {"bodies", s.bodies},
                                  {"fixtures", s.fixtures},
                                  {"undo_steps", s.undo_steps},
-                                 {"places_mm", places}};
+                                 {"places_mm", places},
+                                 {"layout", s.room.layout},
+                                 {"em_pixels", s.room.em_pixels},
+                                 {"full_screen", s.room.full_screen},
+                                 {"asking", s.room.asking},
+                                 {"wheel", s.room.wheel},
+                                 {"panel_keys", s.room.panel_keys},
+                                 {"before", s.room.before},
+                                 {"writing", s.room.writing},
+                                 {"ended", s.room.ended},
+                                 {"ruler", s.room.ruler},
+                                 {"ruler_mm", s.room.ruler_mm},
+                                 {"notes", s.room.notes},
+                                 {"steps_done", s.room.steps_done},
+                                 {"view", s.room.view}};
   const std::filesystem::path beside = file.string() + ".new";
   std::ofstream(beside) << j.dump() << '\n';
   std::error_code ignored;

@@ -1,5 +1,6 @@
 // What the window shows, for programs that test it. Private to libs/window.
 #pragma once
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -12,7 +13,20 @@
 
 namespace osteo {
 
+/// Of what is around the bone.
+struct RoomState {
+  std::string layout;
+  int em_pixels = 0;
+  bool full_screen = false, asking = false, wheel = false, panel_keys = false, before = false, writing = false, ended = false,
+       ruler = false;
+  double ruler_mm = 0;
+  std::size_t notes = 0;
+  int steps_done = 0;
+  std::array<float, 4> view{};  // x, y, width, height
+};
+
 struct WindowState {
+  RoomState room;
   std::uint64_t pictures = 0;  // turns of the loop
   std::uint64_t drawn = 0;     // pictures of the scene
   bool at_rest = false;

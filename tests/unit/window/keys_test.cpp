@@ -59,7 +59,8 @@ TEST(Keys, TheGuideTellsOfEachKey) {
     if (k.code < 'A' || k.code > 'Z') continue;
     EXPECT_NE(keys.find(std::string(" ") + static_cast<char>(k.code) + ","), std::string::npos) << static_cast<char>(k.code);
   }
-  for (const char* name : {" F5,", " Enter,", " Esc,", " Home,", " Space,", " Up,", " Down,", " F1,", " 1 to 7,"})
+  for (const char* name :
+       {" F5,", " Enter,", " Esc,", " Home,", " Space,", " Up,", " Down,", " F1,", " 1 to 7,", " F2,", " F9,", " F10,", " F11,", " Tab,"})
     EXPECT_NE(keys.find(name), std::string::npos) << name << " in" << keys;
 }
 

@@ -258,6 +258,27 @@ TEST(RehearsalControl, SavesGoesOnAndBeginsAnew) {
   sitting.running->stop();
 }
 
+TEST(RehearsalControl, EndsAndGoesOnFromThere) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  control.latch(true);
+  EXPECT_TRUE(control.end());
+  EXPECT_EQ(sitting.running, nullptr);
+  EXPECT_FALSE(control.latched());
+  control.watch();  // that nothing runs is no failure
+  EXPECT_FALSE(control.failure());
+  ASSERT_TRUE(control.begin(false, false));
+  EXPECT_EQ(sitting.begun, 2);
+  // What could not be saved is told, and lost.
+  sitting.fails_to_save = Error(ExitCode::cannot_write, "disk full");
+  EXPECT_FALSE(control.end());
+  ASSERT_TRUE(control.failure());
+  EXPECT_STREQ(control.failure()->what(), "disk full");
+  EXPECT_TRUE(control.lost());
+}
+
 TEST(RehearsalControl, WhatFailsIsToldAndCanBePutRight) {
   Sitting sitting;
   RehearsalControl control = sitting.control();

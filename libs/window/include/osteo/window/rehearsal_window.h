@@ -13,14 +13,14 @@
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/view/quality.h"
+#include "osteo/window/person_settings.h"
 #include "osteo/window/sound_out.h"
+#include "osteo/window/window_shell.h"
 
 namespace osteo {
 
 struct WindowOptions {
-  int width = 1360, height = 860;  ///< made smaller where the screen is
   Quality quality = Quality::automatic;
-  std::string title;
   int tool = 3;
   bool from_case = true;             ///< how the first session begins
   std::string device = "mouse";      ///< as the panel names it
@@ -31,7 +31,25 @@ struct WindowOptions {
   std::optional<Image> ct;           ///< the scan of the case, for its cuts; none: they show what the case keeps of it
   StereoParams stereo;
   bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
+  std::string case_hash;             ///< of the manifest: names the case in captions, without its folder
+  bool end_page = true;              ///< what was done is shown when the person ends the session; false: the window closes
   std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
+};
+
+/// What a session that has ended came to.
+struct SessionFacts {
+  struct Structure {
+    std::string name;
+    double least_clearance_mm = 0, touched_s = 0, injured_s = 0;
+  };
+  std::filesystem::path folder;
+  double seconds = 0, rate_hz = 1000, removed_mm3 = 0, sawn_mm3 = 0, tissue_mm3 = 0;
+  std::size_t bodies = 1;
+  std::vector<std::string> plates;    ///< in words
+  bool has_structures = false;        ///< the case knows structures at risk
+  std::vector<Structure> structures;  ///< those that came near
+  std::vector<std::string> warnings;
+  std::optional<std::string> score;  ///< in words, where somebody gives one
 };
 
 /// How the window looks at the bone when a session begins. Unit vectors.
@@ -69,13 +87,23 @@ struct WindowActions {
   std::function<void(bool drill)> press;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
+  /// Of the session that was saved last.
+  std::function<SessionFacts()> facts = {};
+  /// The scene as the session that runs began with it; may take seconds, and is called in another thread. Empty: cannot be told.
+  std::function<World(const Context&)> world_at_begin = {};
 };
 
-/// Opens a window, begins a session, and runs until the window is closed; the session that runs then is the caller's to save. Returns the
-/// number of OpenGL errors seen (0 when all is well). What fails meanwhile is shown in the window, which offers to begin anew; what was not
-/// put right, or was lost, is thrown once the window is closed. Error(failed) when no window can be opened: then nothing was begun.
-/// `sound`: turned on and off, louder and softer in the window; whoever runs the rehearsal tells it which to follow.
-/// Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
-int run_rehearsal_window(const WindowOptions& options, const SparseGrid* hu, const WindowActions& actions, SoundOut& sound);
+/// How a rehearsal was left.
+struct WindowEnd {
+  bool another = false;                               ///< the person wants another case
+  std::optional<std::filesystem::path> dropped = {};  ///< which, when it was dropped onto the window
+};
+
+/// Begins a session in the window and runs until the person leaves it; the session that runs then is the caller's to save. What fails
+/// meanwhile is shown in the window, which offers to begin anew; what was not put right, or was lost, is thrown at the end. `person`: what
+/// is changed in the window is changed there. `sound`: turned on and off, louder and softer in the window; whoever runs the rehearsal tells
+/// it which to follow. Mouse and keys: docs/guide-surgeon.md, and F1 in the window.
+WindowEnd run_rehearsal_window(WindowShell& shell, PersonSettings& person, const WindowOptions& options, const SparseGrid* hu,
+                               const WindowActions& actions, SoundOut& sound);
 
 }  // namespace osteo

@@ -1,0 +1,35 @@
+// What the burr does now, in words of fixed places. Private to libs/window; no ImGui, no screen.
+#pragma once
+#include <string>
+
+#include "osteo/scene/rehearsal.h"
+#include "palette.h"
+
+namespace osteo {
+
+struct StateFacts {
+  std::string tool;      ///< what is in the hand
+  bool turning = false;  ///< the burr
+  std::string speed;     ///< "41000 rpm"; "still"
+  double force_n = 0;
+  std::string force;       ///< "1.25 N"
+  double force_share = 0;  ///< of kFullForceN, 0 to 1
+  std::string depth;       ///< of the burr in bone
+  std::string under;       ///< bone under the burr: "2.3 mm", "over 10 mm", "-" where it touches none
+  Nearness nearness = Nearness::unknown;
+  std::string structure;  ///< the nearest; "none within 10 mm"; "none in this case"
+  std::string distance;   ///< "1.2 mm"; empty where none is near
+  std::string removed;    ///< "12.3 mm3"
+  std::string time;       ///< "3:07"
+  std::string warning;    ///< the most important that there is to say; empty: nothing
+  bool alarm = false;     ///< and it is one to stop for
+  static constexpr double kFullForceN = 4, kNearMm = 2, kCloseMm = 0.5;
+};
+[[nodiscard]] StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick);
+/// The part of it that follows from a tick alone. `structures` may be null.
+[[nodiscard]] StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz);
+
+/// "3:07"; from an hour "1:03:07".
+[[nodiscard]] std::string clock_text(double seconds);
+
+}  // namespace osteo

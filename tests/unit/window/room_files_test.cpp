@@ -1,0 +1,175 @@
+// What a person chose, and what the start page offers.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "osteo/base/files.h"
+#include "osteo/window/person_settings.h"
+#include "scratch.h"
+#include "start_list.h"
+
+namespace osteo {
+namespace {
+
+void write(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+TEST(PersonSettings, AreKept) {
+  const test::ScratchFolder scratch;
+  const fs::path file = scratch / "config/settings.json";
+  fs::create_directories(scratch / "a");
+  {
+    PersonSettings p(file);
+    EXPECT_TRUE(p.complaints().empty());
+    EXPECT_EQ(p.save(), "");
+    EXPECT_FALSE(fs::exists(file));  // nothing was chosen
+    p.values.scale = 1.21;
+    p.values.layout = "plan";
+    p.opened(scratch / "b");
+    p.opened(scratch / "a");
+    p.opened(scratch / "a/../a");  // the same
+    EXPECT_EQ(p.save(), "");
+  }
+  PersonSettings again(file);
+  EXPECT_TRUE(again.complaints().empty());
+  EXPECT_EQ(again.values.scale, 1.21);
+  EXPECT_EQ(again.values.layout, "plan");
+  ASSERT_EQ(again.cases().size(), 2U);
+  EXPECT_EQ(again.cases()[0].filename(), "a");
+  // Not remembered: not in the file either.
+  again.values.remember_cases = false;
+  again.opened(scratch / "c");
+  EXPECT_EQ(again.save(), "");
+  EXPECT_EQ(read_text(file).find(scratch.path().string()), std::string::npos) << read_text(file);
+}
+
+TEST(PersonSettings, WhatIsWrongIsToldWithItsLineAndTheRestIsTaken) {
+  const test::ScratchFolder scratch;
+  const fs::path file = scratch / "settings.json";
+  write(file, "{\"osteotome_settings\": 1,\n\"volume\": 0.25,\n\"colour\": \"red\",\n\"scale\": 99,\n\"layout\": \"sideways\"}");
+  PersonSettings p(file);
+  ASSERT_EQ(p.complaints().size(), 3U);
+  EXPECT_NE(p.complaints()[0].find("line 3"), std::string::npos) << p.complaints()[0];
+  EXPECT_NE(p.complaints()[1].find("line 4"), std::string::npos) << p.complaints()[1];
+  EXPECT_NE(p.complaints()[2].find("line 5"), std::string::npos) << p.complaints()[2];
+  EXPECT_EQ(p.values.volume, 0.25);
+  EXPECT_EQ(p.values.scale, 1);
+  EXPECT_EQ(p.values.layout, "beside");
+  p.values.alarms = true;
+  EXPECT_EQ(p.save(), "");
+  const auto j = nlohmann::json::parse(read_text(file));
+  EXPECT_EQ(j["colour"], "red");  // of a later version, perhaps
+  EXPECT_EQ(j["alarms"], true);
+}
+
+TEST(PersonSettings, AFileThatCannotBeReadIsLeftAlone) {
+  const test::ScratchFolder scratch;
+  for (const std::string text :
+       {"{\"osteotome_settings\": 1,\n", "[]", "{\"osteotome_settings\": 2}", "{\"osteotome_settings\": 1, // mine\n\"volume\": 1}"}) {
+    const fs::path file = scratch / "settings.json";
+    write(file, text);
+    PersonSettings p(file);
+    EXPECT_EQ(p.complaints().size(), 1U) << text;
+    p.values.scale = 2;
+    EXPECT_NE(p.save().find("not kept"), std::string::npos);
+    EXPECT_EQ(read_text(file), text);
+  }
+  PersonSettings nowhere{fs::path()};
+  nowhere.values.scale = 2;
+  EXPECT_NE(nowhere.save().find("HOME"), std::string::npos);
+  // A file where the folder should be.
+  write(scratch / "file", "x");
+  PersonSettings blocked(scratch / "file/settings.json");
+  blocked.values.scale = 2;
+  EXPECT_NE(blocked.save().find("not kept"), std::string::npos);
+}
+
+TEST(PersonSettings, OnlySoManyCasesAreRemembered) {
+  const test::ScratchFolder scratch;
+  PersonSettings p(scratch / "settings.json");
+  for (int n = 0; n < 30; ++n) p.opened(scratch / std::to_string(n));
+  ASSERT_EQ(p.cases().size(), PersonSettings::kMostCases);
+  EXPECT_EQ(p.cases().front().filename(), "29");
+}
+
+struct Folders {
+  test::ScratchFolder scratch;
+  Folders() {
+    write(scratch / "cases/ear/manifest.json", "{}");
+    for (const char* n : {"1", "2", "10"})
+      write(scratch / "cases/ear/sessions" / n / "session.json", R"({"osteotome_session": 1, "case": "../.."})");
+    fs::create_directories(scratch / "cases/ear/sessions/11");  // nothing in it
+    fs::create_directories(scratch / "cases/empty");
+    write(scratch / "cases/.hidden/manifest.json", "{}");
+    write(scratch / "cases/scan.nrrd", "x");
+  }
+  [[nodiscard]] fs::path cases() const { return scratch / "cases"; }
+};
+int index_of(const StartList& list, const std::string& words) {
+  for (std::size_t n = 0; n < list.entries().size(); ++n) {
+    if (list.entries()[n].words.find(words) != std::string::npos) return static_cast<int>(n);
+  }
+  return -1;
+}
+
+TEST(StartList, FindsItsWayToACase) {
+  const Folders f;
+  StartList list({}, f.scratch.path());
+  EXPECT_EQ(index_of(list, "hidden"), -1);
+  list.select(index_of(list, "cases"));
+  EXPECT_FALSE(list.open());
+  EXPECT_EQ(list.folder(), f.cases());
+  EXPECT_EQ(index_of(list, "scan"), -1);
+  ASSERT_GE(index_of(list, "case: ear"), 0);
+  list.select(index_of(list, "case: ear"));
+  const auto choice = list.open();
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->case_folder, f.cases() / "ear");
+  EXPECT_TRUE(choice->resume.empty());
+  list.up();
+  EXPECT_EQ(list.folder(), f.scratch.path());
+}
+
+TEST(StartList, RecentCasesComeFirstAndTheirLastSessionToo) {
+  const Folders f;
+  StartList list({f.cases() / "ear", f.cases() / "gone"}, f.cases());
+  EXPECT_EQ(list.selected(), 0);
+  EXPECT_NE(list.entries()[0].words.find("ear"), std::string::npos);
+  EXPECT_NE(list.entries()[1].words.find("no longer there"), std::string::npos);
+  EXPECT_EQ(list.entries()[2].folder, f.cases() / "ear/sessions/10");  // after 2
+  list.select(2);
+  const auto session = list.open();
+  ASSERT_TRUE(session) << list.message();
+  EXPECT_EQ(session->resume, f.cases() / "ear/sessions/10");
+  EXPECT_TRUE(fs::equivalent(session->case_folder, f.cases() / "ear"));
+  list.select(1);
+  EXPECT_FALSE(list.open());
+  EXPECT_NE(list.message().find("not there"), std::string::npos);
+  list.forget_recent();
+  EXPECT_EQ(index_of(list, "gone"), -1);
+  // By keys: stops at the ends.
+  list.move(-5);
+  EXPECT_EQ(list.selected(), 0);
+  list.move(1000);
+  EXPECT_EQ(list.selected(), static_cast<int>(list.entries().size()) - 1);
+}
+
+TEST(StartList, WhatIsDroppedIsACaseOrSaysWhyNot) {
+  const Folders f;
+  StartList list({}, f.scratch.path());
+  EXPECT_TRUE(list.take(f.cases() / "ear"));
+  EXPECT_TRUE(list.take(f.cases() / "ear/manifest.json"));
+  EXPECT_EQ(list.take(f.cases() / "ear/sessions/2/session.json")->resume, f.cases() / "ear/sessions/2");
+  EXPECT_FALSE(list.take(f.cases() / "scan.nrrd"));
+  EXPECT_NE(list.message().find("osteo prepare"), std::string::npos);
+  EXPECT_FALSE(list.take(f.cases()));
+  EXPECT_EQ(list.folder(), f.cases());
+  EXPECT_FALSE(list.take(f.cases() / "nothing"));
+  EXPECT_NE(list.message().find("not there"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace osteo

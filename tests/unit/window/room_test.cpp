@@ -1,0 +1,360 @@
+// The room around the bone: rectangles, sizes, colours, wheel, marks, first steps, the page at the end. No screen.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "marks.h"
+#include "palette.h"
+#include "room_layout.h"
+#include "state_facts.h"
+#include "steps.h"
+#include "tool_wheel.h"
+#include "work_done.h"
+
+namespace osteo {
+namespace {
+
+struct Size {
+  int width, height;
+};
+constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440}, {3840, 2160}};
+
+std::vector<Box> boxes_of(const RoomLayout& l) {
+  std::vector<Box> all;
+  for (const Box& b : {l.panel, l.tray, l.view, l.state, l.column, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
+    if (!b.empty()) all.push_back(b);
+  }
+  return all;
+}
+
+// Nothing outside, nothing twice, nothing left: whatever the size, the layout and the size of text.
+TEST(RoomLayout, BoxesTileTheWindow) {
+  for (const Size s : kSizes) {
+    for (const double by_hand : {0.6, 1.0, 1.7, 2.5}) {
+      const auto em = static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height));
+      for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
+        const auto boxes = boxes_of(lay_out(wanted, s.width, s.height, em));
+        float area = 0;
+        for (std::size_t a = 0; a < boxes.size(); ++a) {
+          area += boxes[a].width * boxes[a].height;
+          EXPECT_GE(boxes[a].x, 0);
+          EXPECT_GE(boxes[a].y, 0);
+          EXPECT_LE(boxes[a].right(), static_cast<float>(s.width));
+          EXPECT_LE(boxes[a].bottom(), static_cast<float>(s.height));
+          for (std::size_t b = 0; b < a; ++b) {
+            const bool apart = boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x || boxes[a].bottom() <= boxes[b].y ||
+                               boxes[b].bottom() <= boxes[a].y;
+            EXPECT_TRUE(apart) << s.width << " layout " << static_cast<int>(wanted) << " boxes " << a << " " << b;
+          }
+        }
+        EXPECT_NEAR(area, static_cast<float>(s.width) * static_cast<float>(s.height), 1e-5F * area);
+      }
+    }
+  }
+}
+
+// The least size of all shows every layout at its usual text.
+TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
+  for (const Size s : kSizes) {
+    const auto em =
+        static_cast<float>(std::lround(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height)));
+    EXPECT_GE(em, 16);
+    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
+      const RoomLayout l = lay_out(wanted, s.width, s.height, em);
+      EXPECT_EQ(l.shown, wanted) << s.width << ": " << l.why;
+      EXPECT_TRUE(l.why.empty());
+    }
+    // On a large screen cuts are large too, and the picture is still the largest.
+    const RoomLayout beside = lay_out(Layout::beside, s.width, s.height, em);
+    EXPECT_GE(beside.column.width, std::min(0.22F * static_cast<float>(s.width), 0.28F * static_cast<float>(s.height)));
+    EXPECT_GT(beside.view.width, 0.44F * static_cast<float>(s.width));
+    // Operate is for the picture.
+    const RoomLayout l = lay_out(Layout::operate, s.width, s.height, em);
+    EXPECT_GT(l.view.width * l.view.height, 0.78F * static_cast<float>(s.width) * static_cast<float>(s.height));
+  }
+}
+
+TEST(RoomLayout, WithoutRoomItSaysWhy) {
+  const RoomLayout l = lay_out(Layout::beside, 1024, 700, 24);
+  EXPECT_EQ(l.shown, Layout::operate);
+  EXPECT_NE(l.why.find("no room"), std::string::npos);
+  // However small: a window is dragged through all sizes.
+  for (int w = 200; w < 700; w += 90) {
+    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
+      for (const Box& b : boxes_of(lay_out(wanted, w, 150, 16))) EXPECT_GE(b.width, 0);
+    }
+  }
+}
+
+TEST(RoomLayout, ThreeLayoutsInACircle) {
+  Layout at = Layout::beside;
+  for (const Layout next : {Layout::operate, Layout::plan, Layout::beside}) EXPECT_EQ(at = next_layout(at), next);
+}
+
+TEST(Scale, TextKeepsItsShareOfALargeScreen) {
+  EXPECT_EQ(automatic_scale(1, 1024, 700), 1);
+  EXPECT_EQ(automatic_scale(1, 3840, 2160), 2);
+  EXPECT_EQ(automatic_scale(2.5, 3840, 2160), 2.5);
+  EXPECT_EQ(automatic_scale(1, 3840, 1080), 1);  // wide, not large
+  // By hand from there; never so large that nothing else has room.
+  EXPECT_NEAR(next_scale(next_scale(1, 1), -1), 1, 1e-12);
+  EXPECT_EQ(next_scale(2.5, 1), 2.5);
+  EXPECT_LT(scale_that_fits(1, 2.5, 1024, 700) * kTextPixels * 40, 1025);
+}
+
+// --- colours: IEC 61966-2-1 to linear light; contrast as WCAG 2.1 defines it; dichromats after Vienot, Brettel and Mollon 1999
+
+std::array<double, 3> linear(Colour c) {
+  const auto one = [](float v) {
+    return v <= 0.04045F ? static_cast<double>(v) / 12.92 : std::pow((static_cast<double>(v) + 0.055) / 1.055, 2.4);
+  };
+  return {one(c.red), one(c.green), one(c.blue)};
+}
+double luminance(const std::array<double, 3>& l) {
+  return 0.2126 * l[0] + 0.7152 * l[1] + 0.0722 * l[2];
+}
+double contrast(Colour a, Colour b) {
+  const double x = luminance(linear(a)), y = luminance(linear(b));
+  return (std::max(x, y) + 0.05) / (std::min(x, y) + 0.05);
+}
+
+TEST(Palette, WordsCanBeReadOnTheirGround) {
+  for (const Colour c : {palette::kText, palette::kFaint, palette::kYellow, palette::kOrange, palette::kSkyBlue, palette::kVermillion}) {
+    EXPECT_GE(contrast(c, palette::kGround), 4.5);
+  }
+  EXPECT_GE(contrast(palette::kText, palette::kRaised), 4.5);
+  EXPECT_GE(contrast(palette::kText, palette::kBlue), 4.5);
+  EXPECT_GE(contrast({0, 0, 0}, palette::kVermillion), 4.5);  // "TOUCHED"
+}
+
+// Every two states differ for protanopes and deuteranopes too, and each has a word and a sign of its own.
+TEST(Palette, StatesDifferForTheColourBlind) {
+  const double kProtan[3][3] = {{0.11238, 0.88762, 0}, {0.11238, 0.88762, 0}, {0.00401, -0.00401, 1}};
+  const double kDeutan[3][3] = {{0.29275, 0.70725, 0}, {0.29275, 0.70725, 0}, {-0.02234, 0.02234, 1}};
+  const Nearness states[] = {Nearness::far, Nearness::near, Nearness::close, Nearness::touched};
+  for (const auto& m : {kProtan, kDeutan}) {
+    for (const Nearness a : states) {
+      for (const Nearness b : states) {
+        if (a >= b) continue;
+        const auto seen = [&](Nearness n) {
+          const auto l = linear(look_of(n).colour);
+          std::array<double, 3> out{};
+          for (std::size_t r = 0; r < 3; ++r) out[r] = m[r][0] * l[0] + m[r][1] * l[1] + m[r][2] * l[2];
+          return out;
+        };
+        const auto x = seen(a), y = seen(b);
+        const double lightness = (std::max(luminance(x), luminance(y)) + 0.05) / (std::min(luminance(x), luminance(y)) + 0.05);
+        const double blue = std::abs(x[2] - y[2]);
+        EXPECT_TRUE(lightness > 1.3 || blue > 0.2)
+            << static_cast<int>(a) << " " << static_cast<int>(b) << ": " << lightness << ", " << blue;
+        EXPECT_STRNE(look_of(a).word, look_of(b).word);
+        EXPECT_NE(look_of(a).corners, look_of(b).corners);
+      }
+    }
+  }
+}
+
+// --- wheel
+
+TEST(ToolWheel, EachDirectionIsATool) {
+  ToolWheel wheel;
+  wheel.show(100, 100);
+  EXPECT_EQ(wheel.chosen(), -1);
+  wheel.point(0.5F, 0.5F);  // the hand trembles where it was opened
+  EXPECT_EQ(wheel.chosen(), -1);
+  const auto count = static_cast<int>(wheel_items().size());
+  for (int n = 0; n < count; ++n) {
+    const float angle = 2 * 3.14159265F * static_cast<float>(n) / static_cast<float>(count);
+    wheel.point(5 * std::sin(angle), -5 * std::cos(angle));
+    EXPECT_EQ(wheel.chosen(), n);
+  }
+  // By keys, round and round.
+  wheel.show(0, 0);
+  wheel.turn(1);
+  EXPECT_EQ(wheel.chosen(), 0);
+  wheel.turn(-1);
+  EXPECT_EQ(wheel.chosen(), count - 1);
+  wheel.turn(1);
+  EXPECT_EQ(wheel.chosen(), 0);
+}
+
+TEST(ToolWheel, EachOfItsToolsHasAKey) {
+  for (const WheelItem& item : wheel_items()) EXPECT_FALSE(key_name(item.command).empty()) << item.word;
+}
+
+// --- marks
+
+TEST(Ruler, MeasuresBetweenTwoPoints) {
+  Ruler ruler;
+  ruler.turn(true);
+  EXPECT_FALSE(ruler.click({1, 2, 3}));
+  EXPECT_FALSE(ruler.length_mm());
+  const auto note = ruler.click({1, 5, 7});
+  ASSERT_TRUE(note);
+  EXPECT_EQ(*ruler.length_mm(), 5);
+  const auto j = nlohmann::json::parse(*note);
+  EXPECT_EQ(j["length_mm"], 5);
+  EXPECT_EQ(j["to_mm"], nlohmann::json({1, 5, 7}));
+  EXPECT_FALSE(ruler.click({0, 0, 0}));  // the next one
+  EXPECT_EQ(ruler.points_mm().size(), 1U);
+  ruler.turn(false);
+  EXPECT_TRUE(ruler.points_mm().empty());
+}
+
+TEST(PinnedNotes, AreNumberedAndKeepWhatWasWritten) {
+  PinnedNotes notes;
+  EXPECT_FALSE(notes.pin({}, " \t"));
+  const auto first = notes.pin({1, 2, 3.00049}, "  \"spine\" of Henle ");
+  ASSERT_TRUE(first);
+  const auto j = nlohmann::json::parse(*first);
+  EXPECT_EQ(j["number"], 1);
+  EXPECT_EQ(j["text"], "\"spine\" of Henle");
+  EXPECT_EQ(j["at_mm"][2], 3);
+  // Cut at a letter's end, not within it.
+  std::string umlauts;
+  for (int n = 0; n < 200; ++n) umlauts += "\xC3\xA4";
+  const auto second = notes.pin({}, "x" + umlauts);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(notes.all().back().number, 2);
+  EXPECT_EQ(notes.all().back().text.size(), PinnedNotes::kMostBytes - 1);
+  EXPECT_FALSE(nlohmann::json::parse(*second, nullptr, false).is_discarded());
+  notes.clear();
+  ASSERT_TRUE(notes.pin({}, "again"));
+  EXPECT_EQ(notes.all().back().number, 1);
+}
+
+TEST(ScaleBar, IsARoundNumberThatFits) {
+  for (double pixels_per_mm = 0.3; pixels_per_mm < 300; pixels_per_mm *= 1.37) {
+    const double mm = scale_bar_mm(pixels_per_mm, 250);
+    EXPECT_LE(mm * pixels_per_mm, 250 * (1 + 1e-9));
+    EXPECT_GT(mm * pixels_per_mm, 250 / 2.6);
+    const double digit = mm / std::pow(10, std::floor(std::log10(mm * 1.0001)));
+    EXPECT_TRUE(std::abs(digit - 1) < 1e-9 || std::abs(digit - 2) < 1e-9 || std::abs(digit - 5) < 1e-9) << mm;
+  }
+}
+
+// --- first steps
+
+TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
+  FirstSteps list;
+  StepFacts now;
+  now.eye_distance_mm = 100;
+  now.dust = true;
+  now.removed_mm3 = 7;  // of the session that this one goes on from
+  list.see(now);
+  EXPECT_EQ(list.next(), 0);
+  now.removed_mm3 = 7.2;  // a touch
+  list.see(now);
+  EXPECT_FALSE(list.steps()[0].done);
+  now.removed_mm3 = 8;
+  list.see(now);
+  EXPECT_TRUE(list.steps()[0].done);
+  now.undone = true;
+  list.see(now);
+  now.undone = false;
+  now.sucking = true;
+  now.eye_distance_mm = 80;
+  list.see(now);
+  EXPECT_EQ(list.next(), 4);
+  now.sawn_mm3 = 3;
+  list.see(now);
+  list.renew();  // another session: what was done stays done, what was there counts for nothing
+  now.fixtures = 1;
+  list.see(now);
+  EXPECT_EQ(list.next(), 5);
+  now.fixtures = 2;
+  list.see(now);
+  EXPECT_EQ(list.next(), -1);
+}
+
+TEST(FirstSteps, WithoutDustNothingIsSucked) {
+  FirstSteps list;
+  StepFacts now;
+  now.eye_distance_mm = 100;
+  now.sucking = true;
+  list.see(now);
+  EXPECT_FALSE(list.steps()[2].possible);
+  EXPECT_FALSE(list.steps()[2].done);
+  EXPECT_NE(list.steps()[2].words.find("--dust"), std::string::npos);
+}
+
+// --- what the burr does now
+
+TEST(StateFacts, TellWhatTheTickTells) {
+  TickRecord tick;
+  tick.tick = 187000;
+  tick.device.tool = 3;
+  StateFacts f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.tool, "cutting 4 mm");
+  EXPECT_EQ(f.speed, "still");
+  EXPECT_FALSE(f.turning);
+  EXPECT_EQ(f.under, "-");
+  EXPECT_EQ(f.structure, "none in this case");
+  EXPECT_EQ(f.nearness, Nearness::unknown);
+  EXPECT_EQ(f.time, "3:07");
+  EXPECT_EQ(f.warning, "");
+  tick.speed_rpm = 41180;
+  tick.force_n = {3, 0, 4};
+  tick.thickness_mm = 2.34F;
+  tick.flags = kShaftContact;
+  f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.speed, "41000 rpm");
+  EXPECT_EQ(f.force, "5.00 N");
+  EXPECT_EQ(f.force_share, 1);
+  EXPECT_EQ(f.under, "2.3 mm");
+  EXPECT_EQ(f.warning, "the shaft touches bone");
+  EXPECT_FALSE(f.alarm);
+  // The worse comes first.
+  tick.thickness_mm = 10;
+  tick.flags |= kEscape | kPlateInHand;
+  f = state_of_tick(tick, nullptr, 1000);
+  EXPECT_EQ(f.under, "over 10 mm");
+  EXPECT_EQ(f.tool, "plate in the hand");
+  EXPECT_TRUE(f.alarm);
+  EXPECT_EQ(f.warning, "the burr is buried in bone");
+}
+
+// --- the page at the end
+
+TEST(EndFacts, TellWhatWasDone) {
+  WorkDone work;
+  TickRecord tick;
+  tick.device.tool = 3;
+  tick.speed_rpm = 40000;
+  tick.removed_mm3 = 0.01F;
+  for (int n = 0; n < 3000; ++n) work.tick(tick, {});
+  tick.speed_rpm = 0;
+  tick.removed_mm3 = 0;
+  tick.device.tool = 5;  // only held
+  work.tick(tick, {});
+  work.action(SceneAction::plain(ActionKind::undo));
+  SessionFacts session;
+  session.folder = "case/sessions/4";
+  session.seconds = 3725;
+  session.removed_mm3 = 30;
+  session.has_structures = true;
+  session.structures = {{"facial nerve", 0.7, 0, 0}, {"dura", 0, 0.2, 0}, {"sigmoid sinus", 0, 0.5, 0.25}};
+  const EndFacts facts = end_facts(session, work);
+  const auto value = [&](const std::string& what) {
+    for (const EndLine& l : facts.lines) {
+      if (l.what == what) return l;
+    }
+    return EndLine{what, "not there", Nearness::unknown};
+  };
+  EXPECT_EQ(value("time").value, "1:02:05");
+  EXPECT_EQ(value("bone drilled away").value, "30.0 mm3");
+  EXPECT_EQ(value("    cutting 4 mm").value, "30.0 mm3 in 0:03");
+  EXPECT_EQ(value("taken back").value, "1");
+  EXPECT_EQ(value("score").value, "not there");
+  EXPECT_EQ(value("facial nerve").nearness, Nearness::near);
+  EXPECT_EQ(value("dura").nearness, Nearness::close);
+  EXPECT_EQ(value("sigmoid sinus").nearness, Nearness::touched);
+  EXPECT_NE(value("sigmoid sinus").value.find("INJURED"), std::string::npos);
+  session.score = "81 of 100";
+  EXPECT_EQ(end_facts(session, work).lines[1].value, "81 of 100");
+}
+
+}  // namespace
+}  // namespace osteo
