@@ -56,7 +56,8 @@ inline constexpr std::array<std::uint8_t, 3> kRemovedColour{40, 110, 255};
 
 /// The bone's parts as they are, where they are, each with the CT value of the place it came from; what bone the case has there and the
 /// scene has not any more is tinted by as much as is missing. Black where nothing is known. RGBA, top row first. Bone may be drilled
-/// meanwhile: each voxel is shown as it was or as it is. 0.3 us a pixel with one body, 0.1 more for each other.
+/// meanwhile: each voxel is shown as it was or as it is. 0.1 to 0.2 us a pixel with
+/// one body.
 void draw_live_cut(const SliceView& view, const LiveCut& cut, std::vector<std::uint32_t>& rgba);
 
 }  // namespace osteo
