@@ -296,6 +296,51 @@ TEST(Lending, AnArmRestsAndTellsOfItsHand) {
   EXPECT_LT(length(place() - lent), 2) << "it goes on from where it was";
 }
 
+// A cap's deflection reaches the camera in the user's own right, up and towards; lent, it moves no drill.
+TEST(Lending, ACapDrivesTheCamera) {
+  const auto plugged = [](std::atomic<int>& far) {
+    return [&far](std::string&) -> std::unique_ptr<HidPort> {
+      int ends[2];
+      if (far >= 0 || ::socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends) != 0) return nullptr;
+      far = ends[1];
+      return open_socket(ends[0]);
+    };
+  };
+  std::atomic<int> puck_end{-1}, hand_end{-1};
+  CameraPuck puck(plugged(puck_end));
+  SpaceMouseDevice hand(plugged(hand_end), HandGoal{}, Mat3{}, nullptr);
+  hand.lend(true);
+  // Full deflection, 350 counts, along each of its axes as it reports them.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<std::byte, 7> report{std::byte{1}};
+    report[1 + 2 * axis] = std::byte{350 & 255};
+    report[2 + 2 * axis] = std::byte{350 >> 8};
+    SpaceMouseState state;
+    ASSERT_TRUE(decode_space_mouse(report, state));
+    const Vec3 wanted{state.move[0], state.move[2], -state.move[1]};
+    const auto told = [&](const auto& device) {
+      const DeviceMotion m = device.motion();
+      return m.push && length(*m.push - wanted) < 1e-9;
+    };
+    bool both = false;
+    for (int i = 0; i < 5000 && !both; ++i) {
+      for (const int end : {puck_end.load(), hand_end.load()}) {
+        if (end >= 0) static_cast<void>(::send(end, report.data(), report.size(), MSG_NOSIGNAL));
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      both = told(puck) && told(hand);
+    }
+    EXPECT_TRUE(both) << axis;
+  }
+  Vec3 before = from_floats(hand.read(0, 1e-3, {}).position_mm), now;
+  for (int i = 0; i < 100; ++i) now = from_floats(hand.read(0, 1e-3, {}).position_mm);
+  EXPECT_LT(length(now - before), 1e-9) << "lent";
+  hand.lend(false);
+  for (int i = 0; i < 100; ++i) now = from_floats(hand.read(0, 1e-3, {}).position_mm);
+  EXPECT_GT(length(now - before), 1) << "and its own again";
+  for (const int end : {puck_end.load(), hand_end.load()}) ::close(end);
+}
+
 TEST(ClosedLoop, UnpluggedAndPluggedInAgain) {
   Loop l;
   l.loop.start();
