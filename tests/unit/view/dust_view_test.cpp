@@ -68,7 +68,7 @@ TEST(DustView, IsSeenWhereItLies) {
 }
 
 // A flat layer of dust seen from above, along the rows of its cells: brightness moved by a cell's width resembles itself no more than when
-// moved by any other width. Discs in the middles of cells give 0.9 here.
+// moved by any other width.
 TEST(DustView, ShowsNoRows) {
   const auto bone = test::slab(0.5);
   Dust dust(bone, {.gravity = {0, 0, -1}});

@@ -28,8 +28,9 @@ inline constexpr int kDustModel = 2;
 /// second what hangs together and rests on something is filled again from below. Tools go through water without displacing it.
 /// Amounts are whole numbers of a 65,536th of a voxel, so nothing is lost or made: bone that was added lies there, is in slurry, was
 /// sucked off or ran out of reach; water likewise. Bricks in which nothing moves sleep and cost nothing. The same calls give the same
-/// dust. Reads the bone while the servo writes it. Cost: about 15 ns a cell of bricks that are awake, as much again where there is water;
-/// suck and push a few ns a cell of the bricks they meet, however large their radius. Memory: 2 KB a brick that holds dust, 6 with water.
+/// dust. Reads the bone while the servo writes it. Cost: about 15 ns a cell of bricks that are awake, 130 where all of them are water in
+/// motion; suck and push a few ns a cell of the bricks they meet, however large their radius. Memory: 2 KB a brick that holds dust, 6 with
+/// water.
 class Dust {
  public:
   static constexpr double kMostSolid = 0.3;     ///< bone in slurry, by volume: above it no longer pours (a guess)
