@@ -5,11 +5,11 @@
 
 #include "osteo/bone/action.h"
 #include "osteo/bone/burr.h"
-#include "osteo/camera/stereo.h"
 #include "osteo/bone/posture.h"
+#include "osteo/camera/stereo.h"
 #include "osteo/haptics/contact.h"
-#include "osteo/view/quality.h"
 #include "osteo/marker/device.h"
+#include "osteo/view/quality.h"
 
 namespace osteo {
 

@@ -2,11 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound heat devices doctor demo bench docs help --version" -- "$cur"))
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound experiment devices doctor demo bench docs help --version" -- "$cur"))
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound study devices doctor demo bench docs help --version" -- "$cur"))
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay export sound devices markers calibrate-camera calibrate-pen track-pen doctor demo bench docs help --version" -- "$cur"))
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay score export sound devices doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay score export sound heat experiment study devices markers calibrate-camera calibrate-pen track-pen doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -40,8 +36,8 @@ _osteo() {
     "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics marker " -- "$cur")); return ;;
     "rehearse --camera-place") COMPREPLY=($(compgen -W "facing above behind " -- "$cur")); return ;;
     "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
-    "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --position") COMPREPLY=($(compgen -W "supine prone sitting left_side right_side " -- "$cur")); return ;;
+    "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --quality") COMPREPLY=($(compgen -W "auto plain calm deep " -- "$cur")); return ;;
     "rehearse --layout") COMPREPLY=($(compgen -W "last beside operate plan " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
@@ -92,17 +88,12 @@ _osteo() {
     take-back) flags="$flags --source --by-place --check" ;;
     scene) flags="$flags --settings --contact --dust" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --scan --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --quality --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --require-approved --width --height --scale --layout --full-screen --end-page --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --scan --sound --volume --alarms --stereo --stereo-base --experiment --require-approved --quality --width --height --scale --layout --full-screen --end-page --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
     score) flags="$flags --procedure --mirror --reference --subject --csv --evidence --case-folder" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;
     heat) flags="$flags --cutting-share --diamond-w-per-n --water-c --film --cell-mm --case-folder" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --second-device --second-instrument --dust --rate-hz --resume --sound --volume --alarms --stereo --stereo-base --experiment --require-approved --width --height --state-file --show-settings --side --seconds --fast --pieces" ;;
     experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s" ;;
     study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level" ;;
     devices) flags="$flags --watch --recording" ;;

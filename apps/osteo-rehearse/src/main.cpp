@@ -317,8 +317,8 @@ void close_at_exit() {
 struct OpenCase {
   Case files;
   std::optional<SparseGrid> hu;
-  std::optional<Image> ct;        // the whole scan, where it was given
-  std::vector<SparseGrid> bone;   // density, the finest first
+  std::optional<Image> ct;       // the whole scan, where it was given
+  std::vector<SparseGrid> bone;  // density, the finest first
   ApprovalNow approval;
   VerdictSummary scan;
   std::string hash;

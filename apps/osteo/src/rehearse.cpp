@@ -88,9 +88,8 @@ void refuse_what_is_ignored(const RehearseCommand::Params& p, const cli::Invocat
     for (const char* const name :
          {"device", "arm", "camera", "pen", "video", "camera_place", "hand_scale", "second_device", "second_instrument"})
       refuse(name, "with --headless", "a script's hand moves the burr; leave it out");
-    for (const char* const name :
-         {"quality", "width", "height", "scale", "layout", "full_screen", "end_page", "state_file", "scan", "sound", "volume", "alarms",
-          "stereo", "stereo_base", "experiment"})
+    for (const char* const name : {"quality", "width", "height", "scale", "layout", "full_screen", "end_page", "state_file", "scan",
+                                   "sound", "volume", "alarms", "stereo", "stereo_base", "experiment"})
       refuse(name, "with --headless", "there is no window; leave it out");
   }
 }

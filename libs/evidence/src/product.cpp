@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "osteo/base/parallel.h"
+#include "osteo/bone/world_mesh.h"
 #include "osteo/evidence/visibility.h"
 #include "osteo/grid/brick_linear.h"
 #include "osteo/grid/brick_places.h"

@@ -123,17 +123,17 @@ void CutsPanel::lay_out(const RoomLayout& room) {
   const float line = ImGui::GetFontSize() + style.ItemSpacing.y, pad = 2 * style.WindowPadding.y;
   const float top = 4 * (line + 2) + pad - style.ItemSpacing.y, bottom = 2 * line + pad - style.ItemSpacing.y;
   if (!room.column.empty()) {
-    const Box& c = room.column;
+    const ScreenBox& c = room.column;
     header_ = {c.x, c.y, c.width, std::min(top, c.height)};
     footer_ = {c.x, std::max(c.y, c.bottom() - bottom), c.width, std::min(bottom, c.height)};
     const float each = std::floor((c.height - top - bottom) / CutsControl::kCuts);
     for (std::size_t n = 0; n < boxes_.size(); ++n) boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
   } else if (!room.cuts[0].empty()) {
     boxes_ = room.cuts;
-    Box& first = boxes_.front();
+    ScreenBox& first = boxes_.front();
     header_ = {first.x, first.y, first.width, std::min(top, first.height)};
     first = {first.x, first.y + header_.height, first.width, first.height - header_.height};
-    Box& last = boxes_.back();
+    ScreenBox& last = boxes_.back();
     footer_ = {last.x, std::max(last.y, last.bottom() - bottom), last.width, std::min(bottom, last.height)};
     last.height -= footer_.height;
   }
@@ -250,7 +250,7 @@ void CutsPanel::mouse_over(int cut, float corner_x, float corner_y) {
 
 void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* planned) {
   const auto n = static_cast<std::size_t>(cut);
-  const Box box = boxes_[n];
+  const ScreenBox box = boxes_[n];
   if (box.width < 8 || box.height < 8) return;
   // Letters and lines grow with the cuts, also where the panels' text does not.
   const float scale = std::max(scale_now(), header_.width / 360);

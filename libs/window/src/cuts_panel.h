@@ -22,12 +22,13 @@ class CutsPanel {
   /// A rehearsal has begun. `structures` (may be null) must live until the next call.
   void begin(Rehearsal& rehearsal, StructuresView* structures);
 
-  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room for neither, not at all.
+  /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room for neither, not at
+  /// all.
   void lay_out(const RoomLayout& room);
   /// Width of the column as the person dragged it; 0: as the layout has it.
   [[nodiscard]] float wished_width() const { return wished_width_; }
   /// Where the bone is drawn: the middle, or the place of the cut that has taken it.
-  [[nodiscard]] const Box& scene() const { return scene_; }
+  [[nodiscard]] const ScreenBox& scene() const { return scene_; }
   /// Between ImGui::NewFrame and Render. `planned`: a saw cut that is being placed; null: none.
   void draw(Rehearsal& rehearsal, const SawCut* planned);
   [[nodiscard]] CutsControl& control() { return control_; }
@@ -50,8 +51,8 @@ class CutsPanel {
   std::array<unsigned, CutsControl::kCuts> textures_{};
   std::array<std::optional<DrawnCut>, CutsControl::kCuts> drawn_;
   CutsScene shown_;
-  std::array<Box, CutsControl::kCuts> boxes_;
-  Box header_, footer_, middle_, scene_;
+  std::array<ScreenBox, CutsControl::kCuts> boxes_;
+  ScreenBox header_, footer_, middle_, scene_;
   float wished_width_ = 0;
   bool list_open_ = false, mouse_in_ = false;
 };

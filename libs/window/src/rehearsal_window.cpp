@@ -221,7 +221,7 @@ class RehearsalWindow {
 
   void lay_out() {
     cuts_.lay_out(room_.lay_out(ended_.has_value(), cuts_.wished_width()));
-    const Box& scene = cuts_.scene();
+    const ScreenBox& scene = cuts_.scene();
     scope_.area = {static_cast<double>(scene.x), static_cast<double>(scene.y), std::max(1.0, static_cast<double>(scene.width)),
                    std::max(1.0, static_cast<double>(scene.height))};
   }
@@ -412,7 +412,8 @@ class RehearsalWindow {
 
   [[nodiscard]] ScopeMouse mouse() const {
     const ImGuiIO& io = ImGui::GetIO();
-    const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+    const auto [x, y] =
+        unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
     return {x,
             y,
             static_cast<double>(io.MouseDelta.x),
@@ -621,7 +622,7 @@ class RehearsalWindow {
     r.ruler_mm = room_.ruler().length_mm().value_or(0);
     r.notes = room_.notes().all().size();
     for (const Step& s : room_.steps().steps()) r.steps_done += s.done ? 1 : 0;
-    const Box& v = cuts_.scene();
+    const ScreenBox& v = cuts_.scene();
     r.view = {v.x, v.y, v.width, v.height};
     return r;
   }

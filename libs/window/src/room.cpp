@@ -119,7 +119,7 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
     case Command::wheel: {
       const ImVec2 m = ImGui::GetIO().MousePos;
       const float edge = ToolWheel::kOuterEm * em();
-      const Box& v = layout_.view;
+      const ScreenBox& v = layout_.view;
       const bool inside = v.holds(m.x, m.y);
       const auto kept = [&](float at, float lo, float length) {
         return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
@@ -337,7 +337,7 @@ void Room::draw_note_field(RehearsalControl& control) {
 void Room::draw_marks(const RoomScene& scene) {
   ImDrawList* const draw = ImGui::GetBackgroundDrawList();
   const float e = em();
-  const Box& v = layout_.view;
+  const ScreenBox& v = layout_.view;
   draw->PushClipRect({v.x, v.y}, {v.right(), v.bottom()});
   const auto words = [&](float x, float y, const std::string& text, Colour colour) {
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
@@ -376,7 +376,7 @@ void Room::draw_marks(const RoomScene& scene) {
 void Room::draw_caption(const RoomScene& scene) {
   ImDrawList* const draw = ImGui::GetForegroundDrawList();
   const float e = em();
-  const Box& v = layout_.view;
+  const ScreenBox& v = layout_.view;
   const double bar_mm = scale_bar_mm(scene.pixels_per_mm, static_cast<double>(v.width) / 4);
   const StateFacts state = state_of_tick(scene.tick, nullptr, scene.control.rehearsal().rate_hz());
   char text[200];

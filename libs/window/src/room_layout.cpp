@@ -56,8 +56,8 @@ RoomLayout lay_out(Layout wanted, int width, int height, float em, float column_
       const float tray = ems(kTrayEm), left = std::floor((w - tray) / 2), top = std::floor(above / 2);
       out.tray = {0, 0, tray, h};
       out.view = {tray, 0, left, top};
-      out.cuts = {Box{tray + left, 0, w - tray - left, top}, Box{tray, top, left, above - top},
-                  Box{tray + left, top, w - tray - left, above - top}};
+      out.cuts = {ScreenBox{tray + left, 0, w - tray - left, top}, ScreenBox{tray, top, left, above - top},
+                  ScreenBox{tray + left, top, w - tray - left, above - top}};
       out.state = {tray, above, w - tray, state};
       break;
     }

@@ -8,13 +8,13 @@
 namespace osteo {
 
 /// Pixels of the framebuffer, from the upper left corner.
-struct Box {
+struct ScreenBox {
   float x = 0, y = 0, width = 0, height = 0;
   [[nodiscard]] float right() const { return x + width; }
   [[nodiscard]] float bottom() const { return y + height; }
   [[nodiscard]] bool empty() const { return width <= 0 || height <= 0; }
   [[nodiscard]] bool holds(float px, float py) const { return px >= x && px < right() && py >= y && py < bottom(); }
-  friend bool operator==(const Box&, const Box&) = default;
+  friend bool operator==(const ScreenBox&, const ScreenBox&) = default;
 };
 
 /// beside: panel, picture and cuts; operate: the picture fills the window; plan: picture and three cuts, four up; review: after the end.
@@ -29,13 +29,13 @@ struct EnumNames<Layout> {
 struct RoomLayout {
   Layout shown = Layout::beside;  ///< what there was room for
   std::string why;                ///< when that is not what was asked for; else empty
-  Box panel;                      ///< all that can be set; empty where it is folded to the tray
-  Box tray;                       ///< buttons of instruments; empty where the panel has them
-  Box view;                       ///< the bone
-  Box state;                      ///< what the burr does now: always at the bottom of the view, of the same rows
-  Box column;                     ///< of cuts, one below the other; empty in other layouts
-  std::array<Box, 3> cuts;        ///< four up; empty in other layouts
-  Box page;                       ///< of the end, in review; else empty
+  ScreenBox panel;                ///< all that can be set; empty where it is folded to the tray
+  ScreenBox tray;                 ///< buttons of instruments; empty where the panel has them
+  ScreenBox view;                 ///< the bone
+  ScreenBox state;                ///< what the burr does now: always at the bottom of the view, of the same rows
+  ScreenBox column;               ///< of cuts, one below the other; empty in other layouts
+  std::array<ScreenBox, 3> cuts;  ///< four up; empty in other layouts
+  ScreenBox page;                 ///< of the end, in review; else empty
 };
 /// `em_pixels`: height of text. The boxes tile the window. Any size; below the least that a layout needs (60 em wide beside, 52 x 34 plan)
 /// it is operate that is shown, and says why.

@@ -40,7 +40,7 @@ float share_of_row(int buttons) {
 
 }  // namespace
 
-void draw_state(const Box& box, const StateFacts& f, const std::string& message) {
+void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& message) {
   begin_fixed("state", box, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs);
   ImDrawList* const draw = ImGui::GetWindowDrawList();
   const float e = em(), pad = e * 0.5F, label = e * 0.8F, row = e * 1.9F;
@@ -50,20 +50,20 @@ void draw_state(const Box& box, const StateFacts& f, const std::string& message)
   float x = box.x + pad;
   const float all = box.width - 2 * pad;
   const auto column = [&](int n) {
-    const Box b{x, big_top, all * kShares[n] - pad, row};
+    const ScreenBox b{x, big_top, all * kShares[n] - pad, row};
     x += all * kShares[n];
     return b;
   };
-  const auto head = [&](const Box& b, const std::string& text) {
+  const auto head = [&](const ScreenBox& b, const std::string& text) {
     fitted_text(draw, {b.x, top, b.width, label}, label, palette::kFaint, text);
   };
 
-  const Box tool = column(0);
+  const ScreenBox tool = column(0);
   head(tool, f.tool);
   draw_sign(draw, {tool.x + e * 0.5F, tool.y + row / 2}, e * 0.5F, f.turning ? 3 : 4, f.turning ? palette::kYellow : palette::kFaint);
   fitted_text(draw, {tool.x + e * 1.3F, tool.y, tool.width - e * 1.3F, row}, row * 0.85F, palette::kText, f.speed);
 
-  const Box force = column(1);
+  const ScreenBox force = column(1);
   head(force, "force");
   fitted_text(draw, {force.x, force.y, force.width, row * 0.8F}, row * 0.8F, palette::kText, f.force);
   const float bar = std::max(3.0F, e * 0.25F);
@@ -73,11 +73,11 @@ void draw_state(const Box& box, const StateFacts& f, const std::string& message)
                                   : f.force_share < 1 ? palette::kYellow
                                                       : palette::kVermillion));
 
-  const Box under = column(2);
+  const ScreenBox under = column(2);
   head(under, "bone under it");
   fitted_text(draw, under, row * 0.85F, palette::kText, f.under);
 
-  const Box near = column(3);
+  const ScreenBox near = column(3);
   const NearnessLook& look = look_of(f.nearness);
   head(near, f.distance.empty() ? std::string("structures at risk") : f.structure);
   if (f.nearness == Nearness::touched)  // as large as it can be
@@ -102,7 +102,7 @@ void draw_state(const Box& box, const StateFacts& f, const std::string& message)
   ImGui::End();
 }
 
-void draw_tray(const Box& box, const HandFacts& hand, Pressed& pressed) {
+void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
   begin_fixed("tray", box);
   struct Row {
     const char* word;
@@ -267,7 +267,7 @@ void draw_wheel(const ToolWheel& wheel) {
     draw->AddLine({middle.x + inner * std::cos(edge), middle.y + inner * std::sin(edge)},
                   {middle.x + outer * std::cos(edge), middle.y + outer * std::sin(edge)}, im_colour32(palette::kFaint), 1);
     const float r = outer * 0.68F, wide = 4.4F * e;
-    const Box box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide, e * 1.2F};
+    const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide, e * 1.2F};
     fitted_text(draw, box, e * (chosen ? 1.15F : 1), palette::kText, items[n].word, true);
     fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, palette::kFaint, key_name(items[n].command), true);
   }

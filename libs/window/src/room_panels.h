@@ -30,9 +30,9 @@ struct Pressed {
 
 /// Two rows whose fields never change places: tool and speed, force, bone under the burr, the nearest structure; below, what was removed,
 /// the time and a line of words. `message`: the last thing said; a warning goes before it.
-void draw_state(const Box& box, const StateFacts& facts, const std::string& message);
+void draw_state(const ScreenBox& box, const StateFacts& facts, const std::string& message);
 /// Buttons of instruments one below the other.
-void draw_tray(const Box& box, const HandFacts& hand, Pressed& pressed);
+void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed);
 /// Into the current window: the burr and the hand.
 void draw_burr(const HandFacts& hand, Pressed& pressed);
 /// Into the current window: what one does, and, apart from it, what cannot be taken back.

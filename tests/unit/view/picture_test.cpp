@@ -242,7 +242,7 @@ TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
   changed("wetness");
   view.update(surface, std::vector<std::uint32_t>{surface.bone().find_brick(1, 1, 1)});
   changed("bone");
-  const auto actor = make_plate_actor(surface.joined().mesh);
+  const auto actor = make_bone_actor(to_vtk(surface.joined().mesh));
   scene.renderer->AddActor(actor);
   changed("something new");
   scene.renderer->RemoveActor(actor);

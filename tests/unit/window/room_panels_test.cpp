@@ -33,7 +33,7 @@ void frames(const std::function<void()>& draw) {
   }
 }
 
-void expect_nothing_outside(const char* window, const Box& box, bool may_scroll) {
+void expect_nothing_outside(const char* window, const ScreenBox& box, bool may_scroll) {
   const ImGuiWindow* const w = ImGui::FindWindowByName(window);
   ASSERT_NE(w, nullptr) << window;
   const ImVec2 pad = ImGui::GetStyle().WindowPadding;
@@ -105,7 +105,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         draw_help(open, s.width, s.height);
         EXPECT_EQ(draw_question(s.width, s.height, "Bone whole again?", "This session is saved and ends.", "whole again"), 0);
       });
-      const Box whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
+      const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
       expect_nothing_outside("Mouse and keys", whole, true);
       expect_nothing_outside("Bone whole again?", whole, false);
       const ImGuiWindow* const help = ImGui::FindWindowByName("Mouse and keys");
@@ -148,7 +148,7 @@ TEST(Panels, NothingJumpsWhileDrilling) {
 
 TEST(Panels, AButtonGivesTheCommandOfItsKey) {
   const Memory memory(1280, 800, 16);
-  const Box box = lay_out(Layout::operate, 1280, 800, 16).tray;
+  const ScreenBox box = lay_out(Layout::operate, 1280, 800, 16).tray;
   std::vector<Command> seen;
   // A click on every place of the tray.
   for (float y = 4; y < box.height; y += 10) {

@@ -21,9 +21,9 @@ struct Size {
 };
 constexpr Size kSizes[] = {{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440}, {3840, 2160}};
 
-std::vector<Box> boxes_of(const RoomLayout& l) {
-  std::vector<Box> all;
-  for (const Box& b : {l.panel, l.tray, l.view, l.state, l.column, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
+std::vector<ScreenBox> boxes_of(const RoomLayout& l) {
+  std::vector<ScreenBox> all;
+  for (const ScreenBox& b : {l.panel, l.tray, l.view, l.state, l.column, l.cuts[0], l.cuts[1], l.cuts[2], l.page}) {
     if (!b.empty()) all.push_back(b);
   }
   return all;
@@ -83,7 +83,7 @@ TEST(RoomLayout, WithoutRoomItSaysWhy) {
   // However small: a window is dragged through all sizes.
   for (int w = 200; w < 700; w += 90) {
     for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan, Layout::review}) {
-      for (const Box& b : boxes_of(lay_out(wanted, w, 150, 16))) EXPECT_GE(b.width, 0);
+      for (const ScreenBox& b : boxes_of(lay_out(wanted, w, 150, 16))) EXPECT_GE(b.width, 0);
     }
   }
 }

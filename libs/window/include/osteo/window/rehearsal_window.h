@@ -22,13 +22,13 @@ namespace osteo {
 struct WindowOptions {
   Quality quality = Quality::automatic;
   int tool = 3;
-  bool from_case = true;             ///< how the first session begins
-  std::string device = "mouse";      ///< as the panel names it
-  VerdictSummary scan;               ///< what the import found in the scan; status empty: unknown
-  std::string approval;              ///< of the case, in words; empty: unknown
-  bool approval_ended = false;       ///< by a later change: said in another colour
-  std::vector<SparseGrid> bone;      ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
-  std::optional<Image> ct;           ///< the scan of the case, for its cuts; none: they show what the case keeps of it
+  bool from_case = true;         ///< how the first session begins
+  std::string device = "mouse";  ///< as the panel names it
+  VerdictSummary scan;           ///< what the import found in the scan; status empty: unknown
+  std::string approval;          ///< of the case, in words; empty: unknown
+  bool approval_ended = false;   ///< by a later change: said in another colour
+  std::vector<SparseGrid> bone;  ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
+  std::optional<Image> ct;       ///< the scan of the case, for its cuts; none: they show what the case keeps of it
   StereoParams stereo;
   bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
   std::string case_hash;             ///< of the manifest: names the case in captions, without its folder
