@@ -73,7 +73,7 @@ void set_ui_style(int em_pixels) {
   ImGui::GetStyle() = style;
 }
 
-void begin_fixed(const char* name, const Box& box, ImGuiWindowFlags more) {
+void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more) {
   ImGui::SetNextWindowPos({box.x, box.y});
   ImGui::SetNextWindowSize({box.width, box.height});
   ImGui::Begin(name, nullptr,
@@ -81,7 +81,7 @@ void begin_fixed(const char* name, const Box& box, ImGuiWindowFlags more) {
                    ImGuiWindowFlags_NoBringToFrontOnFocus | more);
 }
 
-void fitted_text(ImDrawList* draw, const Box& box, float em_pixels, Colour colour, const std::string& text, bool middle) {
+void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text, bool middle) {
   if (text.empty() || box.empty()) return;
   ImFont* const font = ImGui::GetFont();
   float size = std::min(em_pixels, box.height);

@@ -32,9 +32,9 @@ void set_ui_style(int em_pixels);
 }
 
 /// A window at a fixed place that only scrolls. End() follows as after ImGui::Begin.
-void begin_fixed(const char* name, const Box& box, ImGuiWindowFlags more = 0);
+void begin_fixed(const char* name, const ScreenBox& box, ImGuiWindowFlags more = 0);
 /// One line of text in a box, as large as fits, at most `em_pixels` high; centred in height, from the left or in the middle.
-void fitted_text(ImDrawList* draw, const Box& box, float em_pixels, Colour colour, const std::string& text, bool middle = false);
+void fitted_text(ImDrawList* draw, const ScreenBox& box, float em_pixels, Colour colour, const std::string& text, bool middle = false);
 /// The sign of a state: a disc for 0 corners.
 void draw_sign(ImDrawList* draw, ImVec2 centre, float radius, int corners, Colour colour);
 
