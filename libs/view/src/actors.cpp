@@ -112,9 +112,12 @@ void set_depth(vtkRenderer* renderer, const PictureStyle& style) {
   renderer->SetUseSSAO(style.effects);
   renderer->SetUseFXAA(style.effects);
   if (!style.effects) return;
-  const double radius_mm = std::clamp(0.035 * seen_height_mm(renderer), 0.5, 8.0);
+  // VTK keeps places for it in half floats: from a microscope's eye, 250 mm away, in steps of 0.12 to 0.25 mm. What lies less than two of
+  // them deeper is not seen as deeper, or flat bone would be striped along its depths.
+  const double step_mm = std::exp2(std::floor(std::log2(1.15 * renderer->GetActiveCamera()->GetDistance())) - 10);
+  const double radius_mm = std::clamp(std::max(0.035 * seen_height_mm(renderer), 8 * step_mm), 0.5, 8.0);
   renderer->SetSSAORadius(radius_mm);
-  renderer->SetSSAOBias(0.06 * radius_mm);
+  renderer->SetSSAOBias(std::max(0.06 * radius_mm, 2 * step_mm));
   renderer->SetSSAOKernelSize(32);
   renderer->SetSSAOBlur(true);
 }

@@ -260,7 +260,7 @@ class RehearsalWindow {
     if (before_view_) before_view_->place(renderer_, room_.before());
     renderer_->ResetCameraClippingRange();
     const bool scene = world_view_ && !control_.failure(), two_eyes = scene && stereo_.on();
-    if (scene) draw_scope(scope_.view(), area, stereo_.params.mode);
+    if (scene && !screenshot_wanted_) draw_scope(scope_.view(), area, stereo_.params.mode);  // the caption has a bar of its own
     if (scene) trial_.draw(scope_.view(), area);
     if (two_eyes) {
       world_view_->wake();  // what the middle of them cannot see, one of the eyes may

@@ -215,7 +215,7 @@ void draw_help(bool& open, int width, int height, const std::function<void()>& s
   const auto w = static_cast<float>(width), h = static_cast<float>(height);
   const float e = em(), column = 30 * e;
   const int columns = std::clamp(static_cast<int>((w - 3 * e) / column), 1, 2);
-  const float wide = std::min(w - e, column * static_cast<float>(columns) + 2 * e), high = std::min(h - e, 46 * e);
+  const float wide = std::min(w - e, column * static_cast<float>(columns) + 2 * e), high = std::min(h - e, 60 * e);
   ImGui::SetNextWindowPos({std::floor((w - wide) / 2), std::floor((h - high) / 2)});
   ImGui::SetNextWindowSize({wide, high});
   ImGui::Begin("Mouse and keys", &open, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);

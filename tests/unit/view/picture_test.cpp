@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <thread>
 
 #include "osteo/io/surface_io.h"
@@ -125,6 +126,38 @@ TEST(Picture, NothingBurnsOutAndNoShadowIsBlack) {
         EXPECT_GT(darkest, 8) << wet << effects;
       }
     }
+  }
+}
+
+// The occlusion's places are half floats: a quarter of a millimetre apart where a microscope looks from.
+TEST(Picture, AMicroscopeSeesNoStripesOnFlatBone) {
+  const auto bone = test::solid(
+      0.4, 12, [](Vec3 p) { return p.y + 0.8 * p.x - 0.3 * p.z > 0 && length(p) < 11; }, {}, 2);
+  LiveSurface surface(bone, {});
+  surface.shade({});
+  Scene scene;
+  BoneView view(scene.renderer);
+  view.show(surface);
+  vtkCamera* const camera = scene.renderer->GetActiveCamera();
+  for (const double field_mm : {8.0, 20.0}) {
+    camera->SetFocalPoint(0, 0, 0);
+    camera->SetPosition(0, -250, 0);
+    camera->SetViewUp(0, 0, 1);
+    camera->SetViewAngle(2 * std::atan(field_mm / 500) * 180 / std::numbers::pi);
+    scene.renderer->ResetCameraClippingRange();
+    const Picture plain = scene.draw({false, 1}), deep = scene.draw({true, 1});
+    double least = 9, most = 0;
+    const int half = static_cast<int>(std::min(150.0, 4 / field_mm * 400));  // within 4 mm of the middle
+    for (int y = 200 - half; y <= 200 + half; ++y) {
+      for (int x = 200 - half; x <= 200 + half; ++x) {
+        const double ratio = mean(deep, x, y, 1) / mean(plain, x, y, 1);
+        least = std::min(least, ratio);
+        most = std::max(most, ratio);
+      }
+    }
+    std::printf("field of %.0f mm: occlusion on a flat face leaves %.3f to %.3f of the light\n", field_mm, least, most);
+    EXPECT_GT(least, 0.9);
+    EXPECT_LT(most, 1.05);
   }
 }
 
