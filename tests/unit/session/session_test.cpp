@@ -354,7 +354,7 @@ TEST(Script, IsReadStrictlyAndErrorsSayFileAndLine) {
          "\"radius_mm\" is 150 but must be");
   expect(with_action("{ \"t_s\": 0.2, \"suction\": { \"radius_mm\": 5 } }"), "7", "\"at_mm\" is missing");
   EXPECT_EQ(with_action("{ \"t_s\": 0.2, \"suction\": { \"mm3_per_s\": 0 } }"), "read");
-  expect(with_action("{ \"t_s\": 0.2, \"irrigate\": { \"share_per_s\": 0.5 } }"), "7", "\"at_mm\" is missing");
+  expect(with_action("{ \"t_s\": 0.2, \"irrigate\": { \"mm3_per_s\": 50 } }"), "7", "\"at_mm\" is missing");
   expect(with_action("{ \"t_s\": 0.2, \"open\": { \"number\": 1, \"opening_mm\": -3 } }"), "7", "\"opening_mm\" is -3");
   EXPECT_EQ(with_action("{ \"t_s\": 5000, \"split\": {} }"), "read");
   EXPECT_EQ(load_script(path).seconds(), 5000);
