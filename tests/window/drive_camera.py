@@ -5,7 +5,7 @@ import pathlib, re, struct, zlib
 
 from drive_window import *  # what it drives with; the arguments are the same
 
-LEFT, RIGHT = 270, 290  # panel and cuts, pixels
+LEFT, RIGHT, HIGH = 288, 272, 614  # panel and cuts at its sides, and how high the picture is; pixels
 
 
 def png(path):
@@ -71,7 +71,7 @@ def camera():
         w.next()
         key("slash", "autofocus", lambda s: apart(s["focus_mm"], eye["focus_mm"]) < 0.2)
         w.x("mousemove", 520, 360)
-        there = key("w", "look there", lambda s: apart(s["focus_mm"], eye["focus_mm"]) > 1)
+        there = key("semicolon", "look there", lambda s: apart(s["focus_mm"], eye["focus_mm"]) > 1)
         key("f", "drill at the bone", lambda s: not s["leading"] and "bone" in s["message"])
         at = key("g", "look at the drill", lambda s: apart(s["focus_mm"], s["at_mm"]) < 1)
         w.x("key", "shift+F6")
@@ -108,7 +108,14 @@ def camera():
         w.x("keydown", "o")
         pressed.add("o")
         w.next()
-        w.x("mousemove_relative", "--", 40, 0)
+        w.x("mousemove", 500, 380)  # in the middle of the view, wherever it was
+        w.next()
+        before = rests(w)
+        for by in (40, -40, 40):  # how far it goes on by itself depends on how fast it came
+            w.x("mousemove_relative", "--", by, 0)
+            w.next(3)
+            if apart(w.state()["focus_mm"], before["focus_mm"]) > 1:
+                break
         moved = w.until("O: it moves", lambda s: apart(s["focus_mm"], before["focus_mm"]) > 1)
         assert apart(moved["goal_mm"], before["goal_mm"]) < 1e-9
         assert dot(moved["view_back"], before["view_back"]) > 0.999999
@@ -131,6 +138,7 @@ def camera():
             w.until("the drill rests", lambda s: apart(s["at_mm"], s["goal_mm"]) < 1e-3)
             w.x("mousemove", 2, 2)
             w.next(3)
+            assert w.state()["view"] == [LEFT, 0, 1000 - LEFT - RIGHT, HIGH], w.state()["view"]
             places.append(w.state()["at_mm"])
             w.key("s", "screenshot", lambda s: s["message"].startswith("saved"))
             assert w.state()["stereo"] > 0
@@ -156,7 +164,7 @@ def camera():
         off = [abs(beside[y][channel][LEFT + eye * width // 2 + x] - (eyes[y][channel][LEFT + 2 * x] + eyes[y][channel][LEFT + 2 * x + 1]) / 2)
                for y in rows for x in range(20, width // 2 - 20, 3)]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
-        off = [abs(above[eye * 350 + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
+        off = [abs(above[eye * (HIGH // 2) + y][channel][x] - (eyes[2 * y][channel][x] + eyes[2 * y + 1][channel][x]) / 2)
                for y in range(20, 260, 3) for x in columns]
         assert sum(d > 2 for d in off) < 0.002 * len(off), (eye, max(off))
     # Notes of the camera carry the magnification.
@@ -165,7 +173,7 @@ def camera():
     assert "magnification" in notes and "view 1 kept" in notes, notes[:400]
     # Each key of the camera was pressed.
     named = {"kBackspace": "BackSpace", "kKeypad4": "KP_Left", "kKeypad6": "KP_Right", "kKeypad8": "KP_Up", "kKeypad2": "KP_Down",
-             "'['": "bracketleft", "']'": "bracketright", "','": "comma", "'.'": "period", "'/'": "slash"}
+             "'['": "bracketleft", "']'": "bracketright", "','": "comma", "'.'": "period", "'/'": "slash", "';'": "semicolon"}
     table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/window/src/keys.cpp").read_text(), re.M)
     wanted = {named.get(k, k[1].lower() if k[0] == "'" else k[1:]) for k, command in table if command in CAMERA}
     assert wanted == pressed - {"f"}, (wanted - pressed, pressed - wanted)

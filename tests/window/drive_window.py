@@ -173,10 +173,10 @@ def keys():
         assert dot([a - b for a, b in zip(deeper["goal_mm"], before["goal_mm"])], before["eye"]) < -0.2, (before, deeper)
         key("Up", "back", lambda s: apart(s["goal_mm"], before["goal_mm"]) < 1e-6)
         # The cuts.
-        key("w", "a cut in the middle", lambda s: s["cut_in_middle"] == 0)
-        key("w", "the bone in the middle", lambda s: s["cut_in_middle"] == -1)
-        key("g", "cuts along the tool", lambda s: s["cuts_along_tool"])
-        key("g", "cuts along the body", lambda s: not s["cuts_along_tool"])
+        key("F3", "a cut in the middle", lambda s: s["cut_in_middle"] == 0)
+        key("F3", "the bone in the middle", lambda s: s["cut_in_middle"] == -1)
+        key("F4", "cuts along the tool", lambda s: s["cuts_along_tool"])
+        key("F4", "cuts along the body", lambda s: not s["cuts_along_tool"])
         # The view, the help, a picture.
         turned = w.drag(3, 60, 20)
         assert dot(turned["eye"], before["eye"]) < 0.99
@@ -236,6 +236,13 @@ def keys():
         w.x("mousemove", 480, 330)
         w.next()
         key("s", "screenshot", lambda s: pathlib.Path("first/screenshot-1.png").exists() and s["message"].startswith("saved"))
+        # What the second hand holds goes round.
+        for _ in range(8):
+            held = key("k", "another in the second hand", lambda s: s["message"].startswith("second hand: "))["message"]
+            w.next()
+            if held == "second hand: nothing":
+                break
+        key("k", "a sucker again", lambda s: "sucker" in s["message"])
         # To the bone, drilled, sucked and washed, out again. A short V and a long one.
         key("f", "at the bone", lambda s: not s["leading"] and s["message"] == "drill brought to the bone")
         down = w.state()
