@@ -101,6 +101,9 @@ class Replaying {
     if (repeating_ && from_changes_.hash() != operation_.world().hash()) differ_in_bone();
     result_.structures = operation_.renderer().structure_events();
     result_.losses = losses(o);
+    if (o.header.dust && o.header.dust_model != kDustModel)
+      result_.losses.push_back("dust of model " + std::to_string(o.header.dust_model) + ", which this version (model " +
+                               std::to_string(kDustModel) + ") does not have: where it lay at the end is not compared");
     result_.bone_hash = from_changes_.hash();
     result_.surface_hash = SurfaceReader(from_changes_, context_).hash();
     if (readers_.dust && repeating_) result_.dust_hash = readers_.dust->dust().hash();
