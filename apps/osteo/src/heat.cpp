@@ -28,8 +28,9 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   const SessionReader session(folder.stream(), Damage::keep);
   const SessionOutline& outline = session.outline();
   HapticSetup setup = outline.header.haptics;
-  const Anatomy anatomy = anatomy_of(load_case(folder.case_folder), setup, io.context);
-  World world = world_at_begin(folder, load_case(folder.case_folder), anatomy, io.context);
+  const Case the_case = load_case(folder.case_folder);
+  const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
+  World world = world_at_begin(folder, the_case, anatomy, io.context);
   HeatOfCutting params;
   params.cutting_share = p.cutting_share;
   params.diamond_w_per_n = p.diamond_w_per_n;

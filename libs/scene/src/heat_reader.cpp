@@ -132,15 +132,7 @@ void HeatReader::scene_changed(const World& world, const World::Effect& effect) 
   for (const PlacedBody& placed : world.bodies()) a.poses.emplace_back(placed.body->id, placed.world_from_body);
   for (const auto& made : effect.made) a.made.push_back(body_of(*world.find(made.body)));
   a.gone = effect.gone;
-  for (const auto& changed : effect.changed) {
-    const BrickGrid& bone = world.find(changed.body)->body->bone;
-    Pending::Bricks bricks{changed.body, changed.bricks, {}};
-    bricks.values.reserve(changed.bricks.size() * BrickGrid::kVoxels);
-    for (const std::uint32_t b : changed.bricks) {
-      for (VoxelKey v = b * BrickGrid::kVoxels; v < (b + 1) * BrickGrid::kVoxels; ++v) bricks.values.push_back(bone.value(v));
-    }
-    a.changed.push_back(std::move(bricks));
-  }
+  a.changed = changed_bricks(world, effect);
   pending_.push_back(std::move(a));
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "osteo/bone/dust.h"
+#include "osteo/scene/changed_bricks.h"
 #include "osteo/scene/reader.h"
 
 namespace osteo {
@@ -39,12 +40,7 @@ class DustReader final : public Reader {
     std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
     std::vector<std::pair<std::uint32_t, Bone>> made;
     std::vector<std::uint32_t> gone;
-    struct Bricks {
-      std::uint32_t body;
-      std::vector<std::uint32_t> bricks;
-      std::vector<float> values;
-    };
-    std::vector<Bricks> changed;
+    std::vector<ChangedBricks> changed;
     std::vector<std::pair<VoxelKey, float>> dust;
   };
   void begin(const World& world);

@@ -10,6 +10,7 @@
 #include "osteo/bone/structure_map.h"
 #include "osteo/heat/heat_field.h"
 #include "osteo/heat/thermal_dose.h"
+#include "osteo/scene/changed_bricks.h"
 #include "osteo/scene/reader.h"
 
 namespace osteo {
@@ -63,12 +64,7 @@ class HeatReader final : public Reader {
     std::vector<std::pair<std::uint32_t, RigidTransform>> poses;
     std::vector<std::unique_ptr<Body>> made;
     std::vector<std::uint32_t> gone;
-    struct Bricks {
-      std::uint32_t body;
-      std::vector<std::uint32_t> bricks;
-      std::vector<float> values;
-    };
-    std::vector<Bricks> changed;
+    std::vector<ChangedBricks> changed;
   };
   [[nodiscard]] std::unique_ptr<Body> body_of(const PlacedBody& placed) const;
   void begin(const World& world);
