@@ -21,9 +21,12 @@ inline constexpr std::array kBenchSubjects{
     BenchSubject{"tissue", "finite elements, the fast model, its calibration"},
     BenchSubject{"haptics-fuzz", "random poses through the whole renderer; not part of all", false},
     BenchSubject{"haptics-hands", "what a tick of 1, 2 and 4 hands costs; not part of all", false},
+    BenchSubject{"ground-truth", "renderers against known solids; writes out/ground-truth; not part of all", false},
     BenchSubject{"removal", "what is removed against what the burr swept"},
     BenchSubject{"slices", "bone from thick slices, against exact bodies"},
     BenchSubject{"registration", "a second scan onto the first, against known motions and SimpleITK"},
+    BenchSubject{"tutoring", "a hand that leads another: bad networks, playback, a flood; not part of all", false},
+    BenchSubject{"network", "what the servo feels of listeners that are flooded, and of all that is listed; not part of all", false},
     BenchSubject{"geometry", "distances, voxels, tetrahedra, curves, masks, skins"},
 };
 

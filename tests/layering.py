@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Who includes whom is what libs/layers.txt says, no more and no less; architecture.md shows the same; no public header has a heavy one."""
+"""Who includes whom is what libs/layers.txt says, no more and no less; architecture.md shows the same; no public header has a heavy one, no two types have one name."""
 import pathlib, re, sys
 
 root = pathlib.Path(sys.argv[1])
@@ -90,6 +90,29 @@ if [lib for lib in shown if lib in table] != list(table):
     bad.append("docs/architecture.md: the rooms stand in another order than in libs/layers.txt")
 for lib in shown.keys() - table.keys() - {"library"}:
     bad.append(f"docs/architecture.md: there is no library {lib}")
+
+# One name, one type: two of the same name in different files of a namespace are one to the linker, which takes either's functions.
+token = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)\'(?:\\.|[^\'\\\n])*\'|//[^\n]*|/\*.*?\*/|[{};]|'
+                   r'\b(?:namespace|struct|class|enum(?: class)?|union)\b[^;{}()=]*(?=[;{])', re.S)
+named = re.compile(r"(?:struct|class|enum(?: class)?|union)\s+(?:\[\[\w+\]\]\s*)?(\w+)\s*(?:final\s*)?(?::(?!:).*)?$", re.S)
+defined = {}
+for path in sorted([*(root / "libs").rglob("*"), *(root / "apps").rglob("*")]):
+    if path.suffix not in (".h", ".cpp"):
+        continue
+    text, scopes, opens = path.read_text(), [], None  # scopes: names of namespaces; None for any other brace
+    for m in token.finditer(text):
+        if m[0] == "{":
+            scopes.append(opens)
+        elif m[0] == "}" and scopes:
+            scopes.pop()
+        opens = None
+        if m[0].startswith("namespace"):
+            opens = " ".join(m[0].split()[1:]) or None  # what stands in one without a name is the file's own
+        elif (n := named.match(m[0].strip())) and text[m.end()] == "{" and all(scopes):
+            defined.setdefault("::".join([*scopes, n[1]]), set()).add(path.relative_to(root).as_posix())
+for name, where in sorted(defined.items()):
+    if len(where) > 1:
+        bad.append(f"{name} is defined in {' and in '.join(sorted(where))}: one of them needs another name")
 
 print("\n".join(bad) or f"{len(table)} libraries, each includes and links what libs/layers.txt says")
 sys.exit(bool(bad))

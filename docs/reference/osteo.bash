@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare report approve edit hand-over take-back scene plan rehearse replay score export sound heat experiment study devices markers calibrate-camera calibrate-pen track-pen doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare batch report approve edit hand-over take-back scene plan rehearse replay playback tutor join score movie review export sound heat monitor stream console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen send fetch receive watch doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -33,14 +33,21 @@ _osteo() {
     "rehearse --burr") COMPREPLY=($(compgen -W "cutting diamond " -- "$cur")); return ;;
     "rehearse --shape") COMPREPLY=($(compgen -W "ball cylinder taper " -- "$cur")); return ;;
     "rehearse --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
-    "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics marker " -- "$cur")); return ;;
+    "rehearse --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics marker igtl " -- "$cur")); return ;;
     "rehearse --camera-place") COMPREPLY=($(compgen -W "facing above behind " -- "$cur")); return ;;
     "rehearse --second-device") COMPREPLY=($(compgen -W "keys spacemouse woodenhaptics " -- "$cur")); return ;;
     "rehearse --position") COMPREPLY=($(compgen -W "supine prone sitting left_side right_side " -- "$cur")); return ;;
+    "rehearse --role") COMPREPLY=($(compgen -W "trainee watcher " -- "$cur")); return ;;
     "rehearse --stereo") COMPREPLY=($(compgen -W "off side_by_side top_bottom anaglyph interlaced quad_buffer " -- "$cur")); return ;;
     "rehearse --quality") COMPREPLY=($(compgen -W "auto plain calm deep " -- "$cur")); return ;;
     "rehearse --layout") COMPREPLY=($(compgen -W "last beside operate plan " -- "$cur")); return ;;
     "rehearse --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
+    "playback --mode") COMPREPLY=($(compgen -W "show feel guide fading amplify graphics " -- "$cur")); return ;;
+    "playback --drills") COMPREPLY=($(compgen -W "usual expert learner " -- "$cur")); return ;;
+    "playback --pace") COMPREPLY=($(compgen -W "usual clock way " -- "$cur")); return ;;
+    "playback --device") COMPREPLY=($(compgen -W "auto mouse spacemouse woodenhaptics marker igtl " -- "$cur")); return ;;
+    "join --role") COMPREPLY=($(compgen -W "trainee watcher " -- "$cur")); return ;;
+    "movie --camera") COMPREPLY=($(compgen -W "surgeon fixed " -- "$cur")); return ;;
     "markers --paper") COMPREPLY=($(compgen -W "a4 letter " -- "$cur")); return ;;
   esac
   local flags="--threads --force --quiet --json --progress --seed --help"
@@ -55,14 +62,14 @@ _osteo() {
     resample) flags="$flags --xml --describe --spacing-mm --lower --between --box-mm --centre-mm --align-mm --hu-out" ;;
     surface) flags="$flags --xml --describe --method --iso" ;;
     mesh-info) flags="$flags --xml --describe --self-intersections" ;;
-    mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --min-body-area-mm2 --keep-largest" ;;
+    mesh-repair) flags="$flags --xml --describe --weld-mm --max-hole-edges --self-intersections --allow-loss --min-body-area-mm2 --keep-largest" ;;
     compare) flags="$flags --xml --describe --iso" ;;
     distance) flags="$flags --xml --describe --region --band-inside-mm --band-outside-mm --spacing-mm --resolution --margin-voxels --method --tree-ascend-n --breadth-first --bound-as-printed --structure --name-nearest --like --nearest-out" ;;
     distance-at) flags="$flags --xml --describe" ;;
     voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
-    tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --levels --surface-spacing-mm --max-volume-mm3 --clean" ;;
+    tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --keep-thin --levels --surface-spacing-mm --max-volume-mm3 --clean --time-limit-s --memory-limit-gb" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
-    fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out" ;;
+    fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out --nodes-out" ;;
     calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --deformed-out --map-out --course-out" ;;
     simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
@@ -81,30 +88,45 @@ _osteo() {
     convert) flags="$flags --source --series --onto-source --description" ;;
     run) flags="$flags --validate --dry-run --reuse" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --keep-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh --no-report" ;;
+    batch) flags="$flags --out --pipeline --jobs --memory-mb --minutes --retries --retry-failed --keep-free-mb --only --report-only --no-report" ;;
     report) flags="$flags --scan" ;;
     approve) flags="$flags --by --note --withdraw" ;;
     edit) flags="$flags --apply --scan --width --height --state-file" ;;
     hand-over) flags="$flags --source" ;;
     take-back) flags="$flags --source --by-place --check" ;;
-    scene) flags="$flags --settings --contact --dust" ;;
+    scene) flags="$flags --settings --contact --dust --heat" ;;
     plan) flags="$flags --out --case-folder --at-s" ;;
-    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --position --head-turned-deg --rate-hz --resume --scan --sound --volume --alarms --stereo --stereo-base --experiment --require-approved --quality --width --height --scale --layout --full-screen --end-page --state-file --show-settings --side --seconds --fast --pieces" ;;
+    rehearse) flags="$flags --headless --script --out --burr --diameter-mm --shape --contact --settings --device --tracker --arm --camera --pen --video --camera-place --hand-scale --second-device --second-instrument --dust --heat --position --head-turned-deg --rate-hz --resume --playback --playback-as --tutor --listen --port --two-way --join --code --role --review --scan --procedure --sound --volume --alarms --monitor --monitor-setup --stream --stereo --stereo-base --experiment --require-approved --quality --width --height --scale --layout --full-screen --end-page --state-file --show-settings --side --seconds --fast --pieces" ;;
     replay) flags="$flags --case-folder --surface-out --bone-out" ;;
-    score) flags="$flags --procedure --mirror --reference --subject --csv --evidence --case-folder" ;;
+    playback) flags="$flags --out --mode --drills --pace --stiffness-n-per-mm --damping-n-s-per-m --forward --most-n --dead-zone-mm --leash-mm --ramp-s --forget --trial-s --from-s --to-s --experts --headless --hand --device --case-folder --state-file" ;;
+    tutor) flags="$flags --out --script --settings --resume --listen --port --two-way --stiffness-n-per-mm --most-n --attend --wait-s" ;;
+    join) flags="$flags --out --case-folder --code --role --hand --stiffness-n-per-mm --most-n --wait-s --patience-s" ;;
+    score) flags="$flags --procedure --mirror --reference --subject --csv --evidence --heat --case-folder" ;;
+    movie) flags="$flags --camera --speed --from-s --to-s --skip-idle --no-overlay --blind --size --fps --deep --case-folder" ;;
+    review) flags="$flags --out --procedure --mirror --reference --subject --earlier --no-pictures --case-folder" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;
     heat) flags="$flags --cutting-share --diamond-w-per-n --water-c --film --cell-mm --case-folder" ;;
-    experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s" ;;
-    study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level" ;;
+    monitor) flags="$flags --out --setup --channel --stimulator-ma --pulses-per-s --width-ms --search --hand --heat --case-folder" ;;
+    stream) flags="$flags --to --setup --speed --listeners --wait-s --case-folder" ;;
+    console) flags="$flags --sound --code --width --height --scale --state-file" ;;
+    experiment) flags="$flags --out --targets --noise --crosstalk --reaction-s --participant --people --trials --device --headless --simulated --retention --null --experiments --chain --level --state-file" ;;
+    ground-truth) flags="$flags --out --program --experiment --bone --trajectory --surface --columns --stiffness-n-per-mm --share" ;;
+    study) flags="$flags --title --procedure --groups --competent --cases --items --attempts --lowest --highest --participant --group --case-name --attempt --rater --out --resamples --level --no-movies" ;;
+    simulate-trainee) flags="$flags --out --skill --procedure --mirror --minutes --approach --window-mm" ;;
     devices) flags="$flags --watch --recording" ;;
     markers) flags="$flags --paper --pen --page" ;;
     calibrate-camera) flags="$flags --out --seconds --width --height --fps --latency-ms" ;;
     calibrate-pen) flags="$flags --camera --out --pen --ruler-mm --seconds" ;;
     track-pen) flags="$flags --camera --pen --seconds" ;;
+    send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dry-run --check" ;;
+    fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --out --study --series --accession --patient-id --date --modality --series-gb" ;;
+    receive) flags="$flags --ae --bind --port --allow --anybody --associations --object-gb --folder-gb --keep-free-gb --memory-mb --timeout-s --association-s --quiet-s --metrics --tls-ca --tls-certificate --tls-key" ;;
+    watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --once --no-report --metrics" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;
-    docs) flags="$flags --check" ;;
+    docs) flags="$flags --check --shared" ;;
   esac
   case "$cur" in
     -*) COMPREPLY=($(compgen -W "$flags" -- "$cur")) ;;

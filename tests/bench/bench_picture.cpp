@@ -5,6 +5,7 @@
 #include <vtkActor.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
+#include <vtkDepthOfFieldPass.h>
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkLight.h>
 #include <vtkLightKit.h>
@@ -12,6 +13,7 @@
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
+#include <vtkRenderStepsPass.h>
 #include <vtkRenderer.h>
 
 #include <algorithm>
@@ -105,9 +107,13 @@ void drill(const World& world, Vec3 centre, Vec3 eye, int rounds) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return std::printf("usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N]\n"), 2;
+  if (argc < 2)
+    return std::printf(
+               "usage: picture_bench CASE [--pictures FOLDER] [--size WxH] [--rounds N] [--plain]      --plain: the plain viewer alone\n"),
+           2;
   std::string pictures;
   int width = 1040, height = 1000, rounds = 15;
+  const bool plain = std::strcmp(argv[argc - 1], "--plain") == 0;
   for (int n = 2; n + 1 < argc; n += 2) {
     if (std::strcmp(argv[n], "--pictures") == 0) pictures = argv[n + 1];
     if (std::strcmp(argv[n], "--size") == 0) std::sscanf(argv[n + 1], "%dx%d", &width, &height);
@@ -146,7 +152,7 @@ int main(int argc, char** argv) {
     return actor;
   };
   show_mesh(add("plain VTK viewer", width, height));
-  {
+  if (!plain) {
     Viewer& v = add("light kit of five lamps, all triangles", width, height);
     v.renderer->AutomaticLightCreationOff();
     vtkNew<vtkLightKit> kit;
@@ -166,6 +172,7 @@ int main(int argc, char** argv) {
                              {"drilling: camera at rest, full size", {false, 1}, false, true},
                              {"drilling: camera at rest, 0.7", {false, 0.7}, false, true},
                              {"at rest: occlusion and smooth edges", {true, 1}, false, true}}) {
+    if (plain) break;
     const int w = static_cast<int>(width * level.style.scale), h = static_cast<int>(height * level.style.scale);
     Viewer& v = add(level.name, w, h);
     set_up_scene(v.renderer);
@@ -195,7 +202,22 @@ int main(int argc, char** argv) {
     set_depth(v.renderer, level.style);
     v.triangles = v.world->drawn_triangles();
   }
-  drill(world, (lo + hi) * 0.5, eye, rounds);
+  // A lens of 16 mm before the eye, as an operating microscope has, focused on the middle of the picture: as at rest, and without
+  // occlusion, which goes by passes of the renderer's own.
+  if (!plain) {
+    Viewer& v = add("at rest: VTK's depth of field", width, height);
+    set_up_scene(v.renderer);
+    v.world = std::make_unique<WorldView>(v.renderer, nullptr);
+    v.world->update(world, readers);
+    look_at(v.renderer, (lo + hi) * 0.5, radius, eye);
+    v.renderer->GetActiveCamera()->SetFocalDisk(16);
+    vtkNew<vtkRenderStepsPass> steps;
+    vtkNew<vtkDepthOfFieldPass> lens;
+    lens->SetDelegatePass(steps);
+    v.renderer->SetPass(lens);
+    v.triangles = v.world->drawn_triangles();
+  }
+  if (!plain) drill(world, (lo + hi) * 0.5, eye, rounds);
   for (int round = -2; round < rounds; ++round) {
     for (const auto& v : viewers) {
       v->window.make_current();

@@ -333,6 +333,7 @@ void two_materials(const Context& context) {
 void bench_tissue(const Context& context) {
   bench::tissue_elements();
   bench::tissue_time();
+  bench::tissue_pressed();
   two_materials(context);
   incompressible();
   gear_calibration(context);

@@ -55,7 +55,9 @@ inline double nrms_of(TissueModel& model, const Body& body, const TissueLoad& lo
 }
 
 /// bench_tissue_fem.cpp: finite elements against analytic answers. bench_tissue_time.cpp: steps in time, resolution, skins.
+/// bench_tissue_pressed.cpp: long steps under a tool.
 void tissue_elements();
 void tissue_time();
+void tissue_pressed();
 
 }  // namespace osteo::bench

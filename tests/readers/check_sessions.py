@@ -69,7 +69,7 @@ def same(what, columns):
 
 def same_actions(what, rows):
     """rows: (tick, name, piece or None, twelve values)"""
-    want = [(a[0], kinds[a[1]], None if a[2] == 0xFFFFFFFF else a[2], list(a[5:])) for a in actions]
+    want = [(a[0], kinds[a[1]], None if a[2] == 0xFFFFFFFF else a[2], list(a)[-12:]) for a in actions]
     assert rows == want, f"{what}: {rows} != {want}"
     print(f"ok  {what}: {len(rows)} actions, equal")
 

@@ -7,7 +7,7 @@ import pathlib, re, subprocess, sys
 
 source, libraries = (pathlib.Path(a) for a in sys.argv[1:3])
 # Everything the servo, a replay, a script or a scene is computed with. Roots, rounding and scaling by powers of two are exact or rounded in one way.
-checked = ["base", "rt", "data", "mesh", "distance", "bone", "haptics", "session", "scene"]
+checked = ["base", "rt", "data", "mesh", "distance", "bone", "haptics", "session", "nerve", "scene"]
 varies = re.compile(r"^(a?(sin|cos|tan)h?|atan2|sincos|hypot|exp(2|10|m1)?|pow|log(2|10|1p|b)?|cbrt|erfc?|[lt]gamma)(f|l)?$")
 allowed = {("mesh", "mesh_info.cpp.o", "atan2")}  # an angle that is reported
 bad, objects = [], 0

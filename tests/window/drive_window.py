@@ -8,6 +8,8 @@ PATIENCE_S = 240  # of a wait; on a machine at rest most take a second
 # Keys of these commands are pressed by drive_camera.py.
 CAMERA = {"magnify", "focus", "autofocus", "look_there", "look_at_drill", "guide_camera", "bookmark", "camera_back",
           "orbit_left", "orbit_right", "orbit_up", "orbit_down"}
+# And of these by drive_hand.py.
+HAND = {"tilt", "roll", "straight", "clutch", "wrist_rest", "second_mouse", "motion", "burr_speed", "hand_page"}
 
 
 def osteo(*args, code=0):
@@ -35,9 +37,12 @@ def apart(a, b):
 
 
 class Screen:
+    def __init__(self, size="1000x700x24"):
+        self.size = size
+
     def __enter__(self):
         read, write = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x700x24", "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", self.size, "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
         os.close(write)
         with os.fdopen(read) as f:
             os.environ["DISPLAY"] = ":" + f.readline().strip()
@@ -57,7 +62,7 @@ class Window:
         wait("the window's first picture", lambda: self.file.exists() or self.app.poll() is not None)
         assert self.app.poll() is None, (self.app.returncode, self.said())
         self.id = wait("the window", lambda: self.x("search", "--name", "^Osteotome").split())[-1]
-        if not case:  # the start page
+        if not case or "--review" in args:  # the start page, or one at the end: nothing ticks
             return
         wait("the first tick", lambda: self.state()["tick"] > 0)
         self.x("mousemove", 480, 330)
@@ -166,6 +171,9 @@ def keys():
         key("c", "cutting", lambda s: s["tool"] == "cutting taper 7 mm")
         key("b", "ball", lambda s: s["tool"] == "cutting 7 mm")
         key("5", "diameter", lambda s: s["tool"] == "cutting 5 mm")
+        key("ctrl+h", "hints", lambda s: s["hints"])
+        key("ctrl+h", "no hints", lambda s: not s["hints"])
+        key("ctrl+t", "only after a session", lambda s: "when it is over" in s["message"] and s["tool"] == "cutting 5 mm")
         key("space", "drill on", lambda s: s["drill_latched"] and s["drill_on"])
         key("space", "drill off", lambda s: not s["drill_latched"] and not s["drill_on"])
         before = w.next()
@@ -214,8 +222,12 @@ def keys():
         w.key("Down", "still open", lambda s: s["wheel"])
         w.key("Return", "the second of the wheel", lambda s: not s["wheel"] and s["tool"] == "diamond 5 mm")
         key("c", "cutting", lambda s: s["tool"] == "cutting 5 mm")
+        key("ctrl+n", "no nerve monitor here", lambda s: s["message"].startswith("there is no nerve monitor"))
+        key("ctrl+m", "nor its sound", lambda s: s["message"].startswith("there is no nerve monitor"))
+        key("ctrl+g", "nobody leads here", lambda s: s["message"].startswith("nobody leads your hand"))
         key("w", "as it was", lambda s: s["before"])
         key("w", "as it is", lambda s: not s["before"])
+        key("ctrl+l", "no region is planned, and it says so", lambda s: "--procedure" in s["message"])
         key("F9", "ruler", lambda s: s["ruler"])
         w.x("mousemove", 490, 300)
         w.next()
@@ -307,7 +319,7 @@ def keys():
         w.key("Escape", "no", lambda s: not s["asking"] and s["session"] == second)
         w.key("r", "asks", lambda s: s["asking"])
         third = w.key("Return", "bone whole again", lambda s: s["session"] not in ("first", first, second) and s["bodies"] == 1 and s["tick"] > 0)["session"]
-        pressed.add("q")
+        pressed.update({"q", "Left", "Right"})  # of the page at the end: room()
         said = w.close()
     for s in ("first", first, second, third):
         assert s in said
@@ -325,8 +337,11 @@ def keys():
     assert 'width: 1000' in osteo("info", "first/screenshot-1.png"), osteo("info", "first/screenshot-1.png")
     # Each key of the table was pressed above.
     named = {"kSpace": "space", "kEscape": "Escape", "kEnter": "Return", "kKeypadEnter": "KP_Enter"}
-    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/window/src/keys.cpp").read_text(), re.M)
-    table = [k for k, command in table if command not in CAMERA]
+    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)(.*)\},$", (source / "libs/window/src/keys.cpp").read_text(), re.M)
+    with_ctrl = {k[1].lower() for k, command, rest in table if "kWithCtrl" in rest}
+    assert {f"ctrl+{k}" for k in with_ctrl} == {k for k in pressed if k.startswith("ctrl+")}, (with_ctrl, pressed)
+    pressed = {k for k in pressed if not k.startswith("ctrl+")}
+    table = [k for k, command, rest in table if command not in CAMERA | HAND and "kWithCtrl" not in rest]
     assert len(table) > 30, table
     wanted = {k[1].lower() if k[0] == "'" else named.get(k, k[1:]) for k in table}
     assert wanted == pressed, (wanted - pressed, pressed - wanted)
@@ -363,6 +378,12 @@ def room():
         w.key("F2", "beside", lambda s: s["layout"] == "beside")
         ended = w.key("q", "the page at the end", lambda s: s["ended"])
         closed(ended["session"])
+        last = w.until("what there is to say of it", lambda s: s["review_s"] > 0)
+        w.key("ctrl+t", "the course of the session", lambda s: s["timeline"] and s["view"][3] < last["view"][3])
+        back = w.key("shift+Left", "ten seconds back", lambda s: s["review_s"] <= max(0, last["review_s"] - 9.9))
+        w.key("Right", "a second on", lambda s: s["review_s"] > back["review_s"])
+        w.key("space", "plays", lambda s: s["playing"] or s["review_s"] == last["review_s"])
+        w.key("ctrl+t", "away again", lambda s: not s["timeline"] and not s["playing"])
         again = w.key("F5", "goes on", lambda s: not s["ended"] and s["tick"] > 0 and s["session"] != ended["session"])
         w.key("q", "the page at the end", lambda s: s["ended"])
         w.key("r", "again", lambda s: not s["ended"] and s["tick"] > 0 and s["session"] != again["session"])
@@ -376,6 +397,26 @@ def room():
     sessions = sorted(p for p in pathlib.Path("case/sessions").iterdir())
     assert len(sessions) == 3, sessions
     assert json.loads((sessions[1] / "session.json").read_text()).get("resumed_from"), sessions
+
+    # One of them, looked at again: nothing is written into it, and no other is begun.
+    def held(folder):
+        return {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in sorted(folder.rglob("*")) if p.is_file()}
+
+    before = held(sessions[0])
+    with Screen():
+        w = Window("--review", sessions[0], end_page=True)
+        last = w.until("what there is to say of it", lambda s: s["ended"] and s["review_s"] > 0)
+        w.key("ctrl+t", "the course of the session", lambda s: s["timeline"])
+        w.key("shift+Left", "back in time", lambda s: s["review_s"] < last["review_s"])
+        for key in ("r", "F5"):
+            w.x("key", key)
+        w.next(3)
+        assert w.state()["ended"], w.state()
+        w.x("key", "q")
+        w.end(0)
+    assert held(sessions[0]) == before
+    assert len(list(pathlib.Path("case/sessions").iterdir())) == 3
+    osteo("rehearse", "case", "--review", sessions[0], "--resume", sessions[0], code=2)
 
 
 def hand():

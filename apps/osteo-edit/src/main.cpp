@@ -8,8 +8,8 @@
 #include <future>
 #include <iostream>
 
-#include "case_scan.h"
 #include "edit_flags.h"
+#include "edited_scan.h"
 #include "licence.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -98,7 +98,7 @@ struct EditWindowCommand {
 
   static int run(const Params& p, cli::Invocation& io) {
     const fs::path folder = io.arguments[0];
-    std::optional<CaseScan> scan = open_case_scan(folder, p.scan, osteo_stages(), io.context);
+    std::optional<EditedScan> scan = open_edited_scan(folder, p.scan, osteo_stages(), io.context);
     EditDocument document(scan->ct, scan->mask, scan->structures ? &*scan->structures : nullptr);
     const fs::path source = scan->scan;
     const std::optional<EditRecipe> edits = scan->edits;

@@ -1,317 +1,24 @@
 // The window of 'osteo rehearse', a program of its own.
-#include <unistd.h>
-
-#include <cstdlib>
 #include <iostream>
-#include <mutex>
-#include <utility>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/bone/burr.h"
-#include "osteo/bone/plates.h"
 #include "osteo/cli/command.h"
-#include "osteo/devices/devices.h"
+#include "osteo/evidence/procedure.h"
 #include "osteo/grid/grid_io.h"
 #include "osteo/io/volume_io.h"
-#include "osteo/marker/device.h"
 #include "osteo/scene/approval.h"
-#include "osteo/scene/free_ways.h"
-#include "osteo/scene/session_folder.h"
+#include "osteo/session/session_reader.h"
 #include "osteo/view/live_cut.h"
+#include "osteo/window/code_page.h"
 #include "osteo/window/rehearsal_window.h"
 #include "osteo/window/start_page.h"
+#include "sitting.h"
 #include "window_flags.h"
 
 namespace osteo {
 namespace {
-
-bool is_space_mouse(const HidInfo& info) {
-  const DeviceModel m = model_of(info.vendor, info.product);
-  return m == DeviceModel::space_mouse || m == DeviceModel::space_mouse_wireless;
-}
-
-// What moves the hands: as asked, or for the drill the best that is plugged in; with a pedal where there is one.
-class Hands {
- public:
-  explicit Hands(const WindowFlags& flags) : hand_(flags.device), dust_(flags.dust) {
-    bool puck = false;
-    for (const FoundDevice& f : find_devices()) {
-      const bool mouse = f.model == DeviceModel::space_mouse || f.model == DeviceModel::space_mouse_wireless;
-      puck = puck || (mouse && f.readable);
-      if (hand_ == Hand::automatic && f.readable && (mouse || f.model == DeviceModel::woodenhaptics))
-        found_ = std::max(found_, mouse ? 1 : 2);
-      if (f.readable && (f.model == DeviceModel::pedal_infinity || f.model == DeviceModel::pedal_pcsensor))
-        pedal_ = std::make_unique<FootPedal>(f.model,
-                                             open_first([m = f.model](const HidInfo& i) { return model_of(i.vendor, i.product) == m; }));
-    }
-    if (hand_ == Hand::automatic) hand_ = found_ == 2 ? Hand::woodenhaptics : found_ == 1 ? Hand::spacemouse : Hand::mouse;
-    second_ = flags.second_device == SecondHand::spacemouse      ? Hand::spacemouse
-              : flags.second_device == SecondHand::woodenhaptics ? Hand::woodenhaptics
-                                                                 : Hand::mouse;
-    second_tool_ = static_cast<std::uint8_t>(instrument_index(flags.second_instrument));
-    if (!flags.arm.empty()) geometry_ = load_woodenhaptics(flags.arm);
-    if (hand_ == Hand::marker) look_for_pen(flags);
-    // One that moves no hand moves the camera.
-    if (puck && hand_ != Hand::spacemouse && second_ != Hand::spacemouse) puck_ = std::make_unique<CameraPuck>(open_first(is_space_mouse));
-  }
-  /// What there is for the camera. `first`: the drill's device, where one runs.
-  [[nodiscard]] CameraDevices camera(Device* first, bool lend) const {
-    CameraDevices devices;
-    // The right switch, where it is no second hand's.
-    devices.pedal = pedal_ && second_ == Hand::mouse && (pedal_->pressed() & pedal_bit(1)) != 0;
-    DeviceMotion motion = puck_ ? puck_->motion() : DeviceMotion{};
-    if (auto* const hand = dynamic_cast<LendsHand*>(first)) {
-      hand->lend(lend);
-      if (lend && !puck_) motion = hand->motion();
-      if (lend && puck_) {
-        const DeviceMotion own = hand->motion();
-        motion.hand_mm = own.hand_mm;
-        motion.axis = own.axis;
-      }
-    }
-    devices.hand_mm = motion.hand_mm;
-    devices.hand_axis = motion.axis;
-    devices.push = motion.push;
-    devices.turn = motion.turn;
-    return devices;
-  }
-  /// `start`: where the drill's hand waits. `near_mm`: where an arm's tool is when it is first heard of; its reach is small. The second
-  /// hand waits beside the first; moved by keys it is there for dust alone.
-  [[nodiscard]] std::vector<std::unique_ptr<Device>> make(const HandGoal& start, Vec3 near_mm) const {
-    std::vector<std::unique_ptr<Device>> all;
-    all.push_back(make_one(hand_, 0, start, near_mm));
-    if (second_ == Hand::mouse && !dust_) return all;
-    HandGoal beside = start;
-    const Vec3 off = any_perpendicular(from_floats(start.axis)) * 15;
-    beside.position_mm += off;
-    beside.tool = second_tool_;
-    all.push_back(make_one(second_, 1, beside, near_mm + off));
-    return all;
-  }
-  [[nodiscard]] std::string name() const {
-    return std::string(EnumNames<Hand>::values[static_cast<std::size_t>(hand_)]) +
-           (second_ != Hand::mouse ? ", " + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(second_)]) : "") +
-           (pedal_ && (hand_ != Hand::mouse || second_ != Hand::mouse) ? " and pedal" : "") + (puck_ ? "; camera: spacemouse" : "");
-  }
-
-  /// Keys and buttons of the window stand in for the pedal of a hand that has none of its own.
-  void press(bool drill) const {
-    if (const auto pen = pen_.lock()) pen->press(drill);
-  }
-
- private:
-  // One camera for all sessions: it takes a second to open. What is wrong with the files is an error now; a camera that is not there is
-  // waited for, and the window says so.
-  void look_for_pen(const WindowFlags& flags) {
-    camera_ = load_camera(flags.camera);
-    const Pen pen = flags.pen.empty() ? Pen{} : load_pen(flags.pen);
-    camera_place_ = flags.camera_place;
-    hand_scale_ = flags.hand_scale;
-    link_ = std::make_shared<PenLink>([from = flags.video, c = camera_] { return open_pictures(from, c.width, c.height, c.fps); }, camera_,
-                                      pen);
-  }
-
-  // Two devices of a kind: the first of them is the first hand's.
-  [[nodiscard]] std::unique_ptr<Device> make_one(Hand kind, std::size_t number, const HandGoal& start, Vec3 near_mm) const {
-    const int before = number > 0 && hand_ == kind ? 1 : 0;
-    // The user looks at the patient's left side, as the window does: away from the user is to the right, right is to the back.
-    if (kind == Hand::spacemouse) {
-      return std::make_unique<SpaceMouseDevice>(open_first(is_space_mouse, before), start,
-                                                Mat3{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, pedal_.get(), number);
-    }
-    if (kind == Hand::marker) {
-      const Mat3 scene_from_desk{{Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}}}, desk = desk_from_camera(camera_place_);
-      const Mat3 scene_from_camera{{scene_from_desk * desk.column[0], scene_from_desk * desk.column[1], scene_from_desk * desk.column[2]}};
-      auto device = std::make_unique<MarkerDevice>(link_, camera_, start, scene_from_camera, hand_scale_, pedal_.get(), number);
-      pen_ = device->keys();
-      return device;
-    }
-    if (kind == Hand::woodenhaptics) {
-      const auto wanted = [](const HidInfo& i) { return model_of(i.vendor, i.product) == DeviceModel::woodenhaptics; };
-      return std::make_unique<WoodenHapticsDevice>(open_first(wanted, before), geometry_,
-                                                   WorkspaceMap(near_mm, Mat3{{Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, 1}}}, 1),
-                                                   start.tool, pedal_.get(), number);
-    }
-    return std::make_unique<MouseDevice>(start);
-  }
-
-  Hand hand_, second_ = Hand::mouse;
-  bool dust_;
-  int found_ = 0;
-  std::uint8_t second_tool_ = 0;
-  WoodenHapticsGeometry geometry_;
-  CameraModel camera_;
-  CameraPlace camera_place_ = CameraPlace::facing;
-  double hand_scale_ = 1;
-  std::shared_ptr<PenLink> link_;
-  mutable std::weak_ptr<HandKeys> pen_;
-  std::unique_ptr<FootPedal> pedal_;
-  std::unique_ptr<CameraPuck> puck_;
-};
-
-// In front of the bone on the patient's left, or where there is none, where a hand waits.
-Vec3 near_the_bone(const World& world, const HandGoal& start) {
-  try {
-    return make_default_script(world, true, start.tool, 10).waypoints.front().at_mm;
-  } catch (const Error&) {
-    return start.position_mm;
-  }
-}
-
-class Sitting;
-// When the display goes away Xlib ends the program, by exit(): the session is closed first.
-Sitting* g_sitting = nullptr;
-void close_at_exit();
-
-// One session after another on a case. Between them, and after whatever throws, none runs.
-class Sitting {
- public:
-  Sitting(const WindowFlags& flags, const Case& the_case, const PersonValues& person, cli::Invocation& io)
-      : case_(the_case),
-        io_(io),
-        hands_(flags),
-        next_folder_(flags.out),
-        last_(flags.resume),
-        sound_(person.sound, person.volume, person.alarms) {
-    options_.rate_hz = flags.rate_hz;
-    options_.follow = {true, true, flags.dust};
-    options_.actions = first_actions(flags);
-    options_.haptics.params.contact.method = flags.contact;
-    apply_haptic_settings(case_.folder, flags.settings, options_.haptics);
-  }
-
-  // Begun and saved in threads of their own; whoever ends the program meanwhile waits.
-  HandGoal begin(bool from_case, const HandView& view) {
-    const std::lock_guard lock(mutex_);
-    sound_.follow(nullptr);
-    rehearsal_.reset();
-    if (!has_anatomy_) {  // the same for all sessions
-      options_.anatomy = anatomy_of(case_, options_.haptics, io_.context);
-      has_anatomy_ = true;
-      if (!io_.common.quiet) io_.err << told_hardness(options_.anatomy) << std::endl;
-    }
-    SessionFolder session{next_folder_, case_.folder, from_case ? std::filesystem::path() : last_};
-    World world = world_at_begin(session, case_, options_.anatomy, io_.context);
-    const HandPose pose = FreeWays(world, skin_of_instrument(static_cast<std::size_t>(view.tool))).waiting(view.eye, view.axis);
-    const HandGoal start{pose.at_mm, to_floats(pose.axis), 0, static_cast<std::uint8_t>(view.tool)};
-    auto devices = hands_.make(start, near_the_bone(world, start));
-    options_.haptics.device = devices.front()->traits();
-    options_.haptics.more_devices.clear();
-    for (std::size_t h = 1; h < devices.size(); ++h) options_.haptics.more_devices.push_back(devices[h]->traits());
-    options_.soft = soft_body_of(case_.folder);
-    // Last, so that what fails before leaves no folder.
-    const SessionFolder before = session_;
-    session_ = create_session_folder(next_folder_, session.case_folder, session.resumed_from);
-    next_folder_.clear();
-    options_.session_file = session_.stream();
-    try {
-      rehearsal_ = std::make_unique<Rehearsal>(std::move(world), std::move(devices), options_, io_.context);
-      rehearsal_->start();
-      sound_.follow(rehearsal_.get());
-      if (sound_.on() && !sound_.failure().empty() && !io_.common.quiet && !told_silence_) {
-        io_.err << sound_.failure() << "; --no-sound does not look for one" << std::endl;
-        told_silence_ = true;
-      }
-      // Registered again: what the servo has made for itself by now must outlive it.
-      static_cast<void>(plate_library());
-      std::atexit(close_at_exit);
-    } catch (...) {
-      sound_.follow(nullptr);
-      rehearsal_.reset();
-      std::error_code ignored;  // nothing was recorded in it
-      std::filesystem::remove_all(session_.folder, ignored);
-      session_ = before;  // what is kept
-      throw;
-    }
-    return start;
-  }
-
-  void save() {
-    const std::lock_guard lock(mutex_);
-    if (!rehearsal_) return;
-    sound_.follow(nullptr);
-    // Whatever comes of it, it is over; and what was recorded can be gone on from.
-    const std::unique_ptr<Rehearsal> over = std::move(rehearsal_);
-    last_ = session_.folder;
-    const RehearsalSummary s = over->stop();
-    write_summary(session_, s, options_.rate_hz, "window", options_.anatomy);
-    facts_ = facts_of(s);
-    for (const std::string& w : s.warnings) io_.context.warn(w);
-    // Told even when quiet: the exit code is about it.
-    if (!s.gaps.empty()) {
-      lost_ticks_ = true;
-      io_.err << "NOT RECORDED: " << s.ticks_not_recorded << " ticks in " << s.gaps.size()
-              << " gaps, since the disk did not keep up; session: " << session_.folder.string() << std::endl;
-    }
-    if (!io_.common.quiet)
-      io_.err << "session: " << session_.folder.string() << "  (" << s.ticks << " ticks, " << s.removed_mm3 << " mm3)" << std::endl;
-  }
-
-  [[nodiscard]] Rehearsal* rehearsal() const { return rehearsal_.get(); }
-  /// Of the session that was saved last.
-  [[nodiscard]] const SessionFacts& facts() const { return facts_; }
-  /// As the session that runs, or ran last, began with it.
-  [[nodiscard]] World at_begin(const Context& context) const { return world_at_begin(session_, case_, options_.anatomy, context); }
-  [[nodiscard]] const std::filesystem::path& folder() const { return session_.folder; }
-  [[nodiscard]] SoundOut& sound() { return sound_; }
-  [[nodiscard]] std::string device() const { return hands_.name(); }
-  [[nodiscard]] CameraDevices camera(bool lend) const { return hands_.camera(rehearsal_ ? &rehearsal_->device() : nullptr, lend); }
-  void press(bool drill) const { hands_.press(drill); }
-  /// Of any session so far, ticks were not recorded.
-  [[nodiscard]] bool lost_ticks() const { return lost_ticks_; }
-
- private:
-  [[nodiscard]] SessionFacts facts_of(const RehearsalSummary& s) const {
-    SessionFacts f;
-    f.folder = session_.folder;
-    f.rate_hz = options_.rate_hz;
-    f.seconds = static_cast<double>(s.ticks) / options_.rate_hz;
-    f.removed_mm3 = s.removed_mm3;
-    f.sawn_mm3 = s.sawn_mm3;
-    f.tissue_mm3 = s.tissue_mm3;
-    f.bodies = s.bodies;
-    for (const Fixture& p : s.fixtures) f.plates.push_back(std::to_string(p.id) + ": " + plate_library()[p.plate].name);
-    const StructureMap* const map = options_.anatomy.structures.get();
-    f.has_structures = map != nullptr;
-    for (const auto& [value, e] : s.structures) {
-      if (map == nullptr) break;
-      f.structures.push_back({map->name_of(static_cast<std::uint8_t>(value)), e.least_clearance_mm,
-                              static_cast<double>(e.ticks_touched) / options_.rate_hz,
-                              static_cast<double>(e.ticks_injured) / options_.rate_hz});
-    }
-    f.warnings = s.warnings;
-    if (!s.gaps.empty()) f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
-    return f;
-  }
-
-  const Case& case_;
-  cli::Invocation& io_;
-  const Hands hands_;
-  std::filesystem::path next_folder_, last_;
-  RehearsalOptions options_;
-  SessionFolder session_;
-  SessionFacts facts_;
-  std::mutex mutex_;
-  std::unique_ptr<Rehearsal> rehearsal_;
-  SoundOut sound_;  // before the rehearsal it follows, it goes
-  bool has_anatomy_ = false, lost_ticks_ = false, told_silence_ = false;
-};
-
-void close_at_exit() {
-  if (g_sitting == nullptr) return;
-  int code = static_cast<int>(ExitCode::cancelled);
-  try {
-    std::exchange(g_sitting, nullptr)->save();
-    std::cerr << "osteo: the display is gone; the session is saved" << std::endl;
-  } catch (const Error& e) {
-    std::cerr << "osteo: the display is gone, and " << e.what() << std::endl;
-    code = static_cast<int>(e.code());
-  } catch (...) {
-    code = static_cast<int>(ExitCode::unspecified);
-  }
-  ::_exit(code);
-}
 
 // A case with what the window shows of it. Read in a thread of its own.
 struct OpenCase {
@@ -322,8 +29,10 @@ struct OpenCase {
   ApprovalNow approval;
   VerdictSummary scan;
   std::string hash;
+  std::vector<PlannedRegion> regions;  // of the procedure, where one was given
 };
-std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& flags, const Context& context) {
+std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& flags, const std::optional<Procedure>& procedure,
+                                    const Context& context) {
   auto open = std::make_unique<OpenCase>();
   open->files = load_case(folder);
   open->approval = approval_of(open->files.folder);
@@ -333,6 +42,10 @@ std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& f
   open->hash = hash_path(open->files.folder / "manifest.json");
   if (const auto it = open->files.files.find("region"); it != open->files.files.end()) open->bone.push_back(load_grid(it->second));
   open->bone.push_back(open->files.bone);
+  if (procedure) {
+    for (const ProcedureRegion& r : procedure->regions)
+      open->regions.push_back({r.name, r.structure, r.kind == RegionKind::forbidden, r.within_mm});
+  }
   if (!flags.scan.empty()) {
     open->ct = load_image(flags.scan, context);
     constexpr double kOwnHu = 60;
@@ -344,6 +57,19 @@ std::unique_ptr<OpenCase> open_case(const fs::path& folder, const WindowFlags& f
     }
   }
   return open;
+}
+
+// How things looked there.
+std::vector<Note> looks_noted_in(const fs::path& session) {
+  const SessionReader reader(SessionFolder{session, {}, {}}.stream());
+  std::vector<Note> notes;
+  auto parts = reader.parts();
+  while (const SessionPart* const p = parts.next()) {
+    for (const Note& n : p->notes) {
+      if (n.kind == "structure" || n.kind == "cuts") notes.push_back(n);
+    }
+  }
+  return notes;
 }
 
 struct WindowCommand {
@@ -382,15 +108,24 @@ struct WindowCommand {
     take(&PersonValues::alarms);
     take(&PersonValues::remember_cases);
     take(&PersonValues::first_steps);
+    take(&PersonValues::motion_one_to);
+    take(&PersonValues::wrist_rest);
+    take(&PersonValues::burr_share);
+    take(&PersonValues::left_handed);
+    take(&PersonValues::mirror_mouse);
+    take(&PersonValues::hints);
+    take(&PersonValues::hints_off);
   }
 
   // One case, from its first session to the last. `left`: how the person left it.
-  static bool sit(const Params& p, const OpenCase& open, WindowShell& shell, PersonSettings& person, cli::Invocation& io, WindowEnd& left) {
+  static bool sit(const Params& p, const OpenCase& open, const Procedure* procedure, WindowShell& shell, PersonSettings& person,
+                  cli::Invocation& io, WindowEnd& left) {
     WindowOptions window;
     window.tool = burr_index(p.burr, p.diameter_mm, p.shape);
     window.from_case = p.resume.empty();
     window.state_file = p.state_file;
     window.end_page = p.end_page;
+    window.review_only = !p.review.empty();
     window.case_hash = open.hash;
     window.approval = open.approval.words();
     window.approval_ended = open.approval.state == ApprovalState::outdated;
@@ -398,34 +133,44 @@ struct WindowCommand {
     window.quality = p.quality;
     window.ct = open.ct;
     window.bone = open.bone;
+    window.regions = open.regions;
     window.stereo.mode = p.stereo;
     window.stereo.base_mm = p.stereo_base;
     window.camera_trial = p.experiment == "camera";
     shell.set_title("Osteotome - " + open.files.folder.filename().string());
-    Sitting sitting(p, open.files, person.values, io);
+    Sitting sitting(p, open.files, procedure, person.values, io);
     window.device = sitting.device();
+    window.way = sitting.way();
     io.end_progress();
 
     WindowActions actions;
     actions.begin = [&](bool from_case, const HandView& view) { return sitting.begin(from_case, view); };
     actions.save = [&] { sitting.save(); };
     actions.rehearsal = [&] { return sitting.rehearsal(); };
+    if (!p.resume.empty()) actions.notes_before = [&] { return looks_noted_in(p.resume); };
     actions.folder = [&] { return sitting.folder(); };
     actions.failure = [&] { return sitting.rehearsal()->recording().failure; };
     actions.camera = [&](bool lend) { return sitting.camera(lend); };
-    actions.press = [&](bool drill) { sitting.press(drill); };
+    actions.tune = [&](const HandTuning& tuning) { sitting.tune(tuning); };
+    actions.switches = [&](bool attended) { return sitting.switches(attended); };
     actions.stop = [&] { return io.context.cancelled(); };
+    actions.monitor = [&] { return sitting.monitor(); };
+    if (p.tutor || !p.join.empty() || !p.playback.empty()) {
+      actions.tutor = [&] { return sitting.tutor(); };
+      actions.lead = [&](bool on) { sitting.lead(on); };
+    }
     actions.facts = [&] { return sitting.facts(); };
+    actions.review = [&](const Context& context) { return sitting.review(context); };
     actions.world_at_begin = [&](const Context& context) { return sitting.at_begin(context); };
-    g_sitting = &sitting;
+    sitting.save_at_exit(true);
     try {
       left = run_rehearsal_window(shell, person, window, open.hu ? &*open.hu : nullptr, actions, sitting.sound());
     } catch (...) {
-      g_sitting = nullptr;
+      sitting.save_at_exit(false);
       sitting.save();
       throw;
     }
-    g_sitting = nullptr;
+    sitting.save_at_exit(false);
     person.values.sound = sitting.sound().on();
     person.values.volume = sitting.sound().volume();
     person.values.alarms = sitting.sound().alarms();
@@ -434,10 +179,27 @@ struct WindowCommand {
   }
 
   static int run(const Params& p, cli::Invocation& io) {
+    if (!p.monitor_setup.empty() && !p.monitor)
+      throw Error(ExitCode::usage, "--monitor-setup has no effect without --monitor", "add --monitor, or leave it out");
+    if (p.device == Hand::igtl && p.tracker.empty())
+      throw Error(ExitCode::usage, "--device igtl needs --tracker", "HOST:PORT or HOST:PORT/NAME");
+    const std::pair<const char*, bool> begins[] = {
+        {"--resume", !p.resume.empty()}, {"--playback", !p.playback.empty()}, {"--tutor", p.tutor},
+        {"--join", !p.join.empty()},     {"--out", !p.out.empty()},           {"--experiment", !p.experiment.empty()},
+        {"--no-end-page", !p.end_page}};
+    for (const auto& [flag, given] : begins) {
+      if (given && !p.review.empty())
+        throw Error(ExitCode::usage, std::string(flag) + " has no effect with --review",
+                    "a session that is over is looked at; leave it out");
+    }
+    if (!p.review.empty() && io.arguments.empty())
+      throw Error(ExitCode::usage, "--review takes the session's <case> too", "osteo rehearse CASE --review SESSION");
     if (!p.experiment.empty() && p.experiment != "camera")
       throw Error(ExitCode::usage, "--experiment: there is no '" + p.experiment + "'", "'camera' is the only one");
     if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))
       io.context.warn("how the patient lies moves dust and water alone, and there are none: add --dust");
+    std::optional<Procedure> procedure;  // of all cases that are opened
+    if (!p.procedure.empty()) procedure = load_procedure(p.procedure);
     PersonSettings person(PersonSettings::usual_file());
     for (const std::string& c : person.complaints()) io.context.warn(c);
     PersonValues kept = person.values;
@@ -461,6 +223,11 @@ struct WindowCommand {
     start.state_file = p.state_file;
     start.stop = [&] { return io.context.cancelled(); };
     std::optional<StartChoice> choice;
+    if (!flags.join.empty() && flags.code.empty()) {
+      const auto typed = ask_for_code(shell, flags.join, start.stop, p.state_file);
+      if (!typed) return static_cast<int>(ExitCode::ok);
+      flags.code = *typed;
+    }
     if (from_command_line) choice = StartChoice{io.arguments[0], p.resume};
     bool chosen_in_window = !from_command_line;
     while (!closed && !io.context.cancelled()) {
@@ -473,10 +240,10 @@ struct WindowCommand {
       try {
         std::unique_ptr<OpenCase> open;
         shell.while_working("the case is opened", io.context,
-                            [&](const Context& context) { open = open_case(choice->case_folder, p, context); });
+                            [&](const Context& context) { open = open_case(choice->case_folder, p, procedure, context); });
         person.opened(open->files.folder);
         sat = true;
-        lost_ticks = sit(flags, *open, shell, person, io, left) || lost_ticks;
+        lost_ticks = sit(flags, *open, procedure ? &*procedure : nullptr, shell, person, io, left) || lost_ticks;
         closed = !left.another;
         start.message.clear();
       } catch (const Error& e) {
@@ -490,6 +257,7 @@ struct WindowCommand {
       if (left.dropped) choice = choice_of(*left.dropped, start.message);
       chosen_in_window = true;
       flags.out.clear();
+      flags.review.clear();
     }
     person.values.scale = shell.by_hand();
     keep(before, person.values, kept);

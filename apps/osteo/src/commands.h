@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "console_flags.h"
 #include "edit_flags.h"
 #include "osteo/bone/burr.h"
 #include "osteo/cli/command.h"
@@ -10,6 +11,11 @@
 #include "osteo/image/crop.h"
 #include "osteo/marker/body.h"
 #include "osteo/marker/sheet.h"
+#ifdef OSTEO_WITH_MOVIE
+#include "osteo/movie/movie_options.h"
+#endif
+#include "osteo/segment/ear.h"
+#include "osteo/tutor/playback_params.h"
 #include "window_flags.h"
 
 namespace osteo {
@@ -214,6 +220,62 @@ struct HeatCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
+struct MonitorCommand {
+  struct Params {
+    std::string out, setup, channel;
+    double stimulator_ma = 0, pulses_per_s = 4, width_ms = 0.1;
+    bool search = false;
+    int hand = 0;
+    bool heat = true;
+    std::string case_folder;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for what it writes (also -o)"}, p.out);
+    visit({"setup", "constants and channels, as JSON (empty: as the session was recorded with, or the built-in ones)"}, p.setup);
+    visit({"channel", "that channel.wav has (empty: the first); 1 mV is full scale"}, p.channel);
+    visit({"stimulator_ma", "what if: a tool's tip stimulates all the time it touches (0: as the session has it)", "mA", 0, 5},
+          p.stimulator_ma);
+    visit({"pulses_per_s", "of that", "1/s", 1, 30}, p.pulses_per_s);
+    visit({"width_ms", "of its pulses", "ms", 0.05, 1}, p.width_ms);
+    visit({"search", "it looks for the threshold, once, from --stimulator-ma on"}, p.search);
+    visit({"hand", "whose tool", "", 0, 3}, p.hand);
+    visit({"heat", "nerves feel the heat of burrs"}, p.heat);
+    visit({"case_folder", "where the case is now, when it was moved"}, p.case_folder);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct StreamCommand {
+  struct Params {
+    std::string to, setup;
+    double speed = 1;
+    int listeners = 1;
+    double wait_s = 60;
+    std::string case_folder;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"to",
+           "where to: igtl:PORT, igtl:HOST:PORT (to listen on), cerebus:HOST:PORT/VERSION (3.11, 4.0, 4.1 or 4.2), lsl; several with "
+           "commas between"},
+          p.to);
+    visit({"setup", "of the nerve monitor, as JSON (empty: as the session was recorded with, or the built-in one)"}, p.setup);
+    visit({"speed", "times real time", "", 0.05, 20}, p.speed);
+    visit({"listeners", "it begins when so many are there (0: at once); Cerebus packets have none", "", 0, 8}, p.listeners);
+    visit({"wait_s", "for them, at most", "s", 1, 86400}, p.wait_s);
+    visit({"case_folder", "where the case is now, when it was moved"}, p.case_folder);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct ConsoleCommand {
+  using Params = ConsoleFlags;
+  static void describe(Params& p, auto& visit) { ConsoleFlags::describe(p, visit); }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
 struct BenchCommand {
   struct Params {};
   static void describe(Params&, auto&) {}
@@ -239,8 +301,12 @@ struct RunCommand {
 struct DocsCommand {
   struct Params {
     bool check = false;
+    bool shared = false;
   };
-  static void describe(Params& p, auto& visit) { visit({"check", "compare instead of writing; fails when a page is stale"}, p.check); }
+  static void describe(Params& p, auto& visit) {
+    visit({"check", "compare instead of writing; fails when a page is stale"}, p.check);
+    visit({"shared", "instead: man pages, completion of bash, zsh and fish, modules of 3D Slicer; what is there is replaced"}, p.shared);
+  }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
 };
@@ -354,12 +420,6 @@ struct TakeBackCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
-enum class Side : int { left, right };
-template <>
-struct EnumNames<Side> {
-  static constexpr std::array<std::string_view, 2> values{"left", "right"};
-};
-
 struct RehearseCommand {
   struct Params : WindowFlags {
     bool headless = false;
@@ -389,15 +449,105 @@ struct SceneCommand {
     std::string settings;
     ContactMethod contact = ContactMethod::overlap;
     bool dust = false;
+    bool heat = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
     visit({"contact", "how the burr feels bone"}, p.contact);
     visit({"dust", "with bone dust"}, p.dust);
+    visit({"heat", "with heat of drilling"}, p.heat);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
 };
+
+struct PlaybackCommand {
+  struct Params : PlaybackParams {
+    std::string out;
+    bool headless = false;
+    std::string hand = "simulated:250";
+    double from_s = 0, to_s = 0;
+    std::string experts;
+    Hand device = Hand::automatic;
+    std::string case_folder;
+    std::string state_file;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for the guided session (empty: a new one in CASE/sessions; also -o)"}, p.out);
+    PlaybackParams::describe(p, visit);
+    visit({"from_s", "of the session: where the lesson begins; bone is as it was then", "s", 0, 1e6}, p.from_s);
+    visit({"to_s", "and where it ends (0: with the session)", "s", 0, 1e6}, p.to_s);
+    visit(
+        {"experts",
+         "fading, amplify: more sessions of the same step, by commas; three quarters of the distances between their ways and the lesson's "
+         "are the dead zone"},
+        p.experts);
+    visit({"headless", "without a window and as fast as possible: a simulated hand is led"}, p.headless);
+    visit({"hand", "headless: simulated:STIFFNESS, in N/m (100 to 500 is a grip); it has no will of its own"}, p.hand);
+    visit({"device", "in the window, what moves the drill, as in 'rehearse'"}, p.device);
+    visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
+    visit({"state_file", "as in 'rehearse'"}, p.state_file);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+/// As what one joins.
+struct TutorCommand {
+  struct Params {
+    std::string out, script, settings, resume;
+    std::string listen = "127.0.0.1";
+    int port = 0;
+    bool two_way = false;
+    double stiffness_n_per_mm = 1, most_n = 3, wait_s = 60;
+    int attend = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for the session (empty: a new one in CASE/sessions; also -o)"}, p.out);
+    visit({"script", "the instructor's strokes, as JSON"}, p.script);
+    visit({"settings", "how it feels, as JSON (empty: haptics.json of the case where there is one)"}, p.settings);
+    visit({"resume", "a session to go on from (empty: the case's bone); those who join are sent what it did"}, p.resume);
+    visit({"listen",
+           "address of this machine to be heard on; 127.0.0.1 or ::1: by this machine alone, 0.0.0.0 or :: : by all that can reach it"},
+          p.listen);
+    visit({"port", "UDP; 0: any that is free", "", 0, 65535}, p.port);
+    visit({"two_way", "the instructor's hand is pulled by the trainee's too"}, p.two_way);
+    visit({"stiffness_n_per_mm", "with --two-way, of that pull; less where the delay would not bear it", "N/mm", 0, 10},
+          p.stiffness_n_per_mm);
+    visit({"most_n", "with --two-way, at most", "N", 0, 20}, p.most_n);
+    visit({"attend", "so many are to have joined, with their copies made, when the session begins", "", 0, 9}, p.attend);
+    visit({"wait_s", "for them at most; then it begins with those who are there", "s", 0, 3600}, p.wait_s);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct JoinCommand {
+  struct Params {
+    std::string case_folder, code, hand = "simulated:250", out;
+    Attend role = Attend::trainee;
+    double stiffness_n_per_mm = 1, most_n = 3, patience_s = 10, wait_s = 60;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for the session as it comes here: the host's, to the bit (empty: it is not recorded; also -o)"}, p.out);
+    visit({"case_folder", "the same case as the host's"}, p.case_folder);
+    visit({"code", "that the host shows (empty: asked for)"}, p.code);
+    visit({"role", "trainee: the second hand; watcher: a copy of the bone, and no hand"}, p.role);
+    visit({"hand", "trainee: simulated:STIFFNESS, in N/m; it has no will of its own"}, p.hand);
+    visit({"stiffness_n_per_mm", "of the pull to the instructor's hand; less where the delay would not bear it", "N/mm", 0, 10},
+          p.stiffness_n_per_mm);
+    visit({"most_n", "of that pull, at most", "N", 0, 20}, p.most_n);
+    visit({"wait_s", "for the host to answer, at most", "s", 0, 3600}, p.wait_s);
+    visit({"patience_s", "the session counts as over when nothing was heard of the host for so long; else when the host says so", "s", 0.5,
+           600},
+          p.patience_s);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+/// "simulated:250", in N/m. Error(usage).
+[[nodiscard]] double simulated_stiffness(const std::string& hand);
 
 struct ReplayCommand {
   struct Params {
@@ -436,13 +586,53 @@ struct ExperimentCommand {
     double noise = 0.1;
     double crosstalk = 0.15;
     double reaction_s = 0.25;
+    std::string participant, people, device = "mouse", state_file;
+    int trials = 72;
+    bool headless = false, simulated = false, retention = false, null = false, chain = false;
+    int experiments = 1000;
+    double level = 0.95;
   };
   static void describe(Params& p, auto& visit) {
-    visit({"out", "every view and its time, as CSV (empty: only the table; also -o)"}, p.out);
+    visit({"out", "camera: every view and its time, as CSV (empty: only the table); demo: its folder (also -o)"}, p.out);
     visit({"targets", "views to bring the camera to", "", 1, 10000}, p.targets);
     visit({"noise", "standard deviation of a move's end, of its length", "", 0, 0.5}, p.noise);
     visit({"crosstalk", "six degrees and rates: what an axis that was not meant gets of the others", "", 0, 1}, p.crosstalk);
     visit({"reaction_s", "a look before each move", "s", 0, 2}, p.reaction_s);
+    visit({"participant", "force-skill: whose trials, by code"}, p.participant);
+    visit({"people", "codes of a new experiment's participants, as 'P01, P02' (empty: twelve)"}, p.people);
+    visit({"trials", "of each participant of a new experiment: a multiple of 9", "", 9, 999}, p.trials);
+    visit({"device", "force-skill: what the hand holds: mouse, keys, woodenhaptics or spacemouse"}, p.device);
+    visit({"headless", "force-skill: without a window"}, p.headless);
+    visit({"simulated", "force-skill: a program takes part, and everything says so"}, p.simulated);
+    visit({"retention", "force-skill: on another day: every stimulus once, without aid"}, p.retention);
+    visit({"null", "programs that learn equally well by each training"}, p.null);
+    visit({"experiments", "null: how many", "", 10, 100000}, p.experiments);
+    visit({"chain", "null: small experiments by programs, run and scored, instead of drawn scores; 0.3 s of one core each"}, p.chain);
+    visit({"level", "of intervals", "", 0.5, 0.999}, p.level);
+    visit({"state_file", "force-skill: the window writes here what it shows, for tests"}, p.state_file);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct GroundTruthCommand {
+  struct Params {
+    std::string out, program, experiment, bone, trajectory, surface;
+    std::string columns = "t x y z fx fy fz";
+    double stiffness_n_per_mm = 0.5, share = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for tables, leaderboard and trajectories (also -o)"}, p.out);
+    visit({"program", "command of a renderer to measure beside ours: positions come by its standard input, forces go by its output"},
+          p.program);
+    visit({"experiment", "solids, renderers and friction as JSON, as in pipelines/ground-truth (empty: all that is built in)"},
+          p.experiment);
+    visit({"bone", "closed surface of a bone to add to the solids (.ply, .stl, ...; empty: none)"}, p.bone);
+    visit({"trajectory", "a recorded out-trajectory with its forces to play instead, as text (needs --surface)"}, p.trajectory);
+    visit({"surface", "closed surface of what was probed, in the trajectory's own coordinates, mm"}, p.surface);
+    visit({"columns", "of the trajectory: t, x, y, z, fx, fy, fz in their order, '-' for what is not wanted; s, mm, N"}, p.columns);
+    visit({"stiffness_n_per_mm", "of the spring that the recorded forces are taken for", "N/mm", 0.01, 100}, p.stiffness_n_per_mm);
+    visit({"share", "of each trajectory's length: less is quicker, and less is seen", "", 0.02, 10}, p.share);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);
@@ -456,6 +646,7 @@ struct ScoreCommand {
     std::string subject;
     std::string csv;
     bool evidence = false;
+    bool heat = false;
     std::string case_folder;
   };
   static void describe(Params& p, auto& visit) {
@@ -465,6 +656,60 @@ struct ScoreCommand {
     visit({"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"}, p.subject);
     visit({"csv", "also write a header and a row of all values (.csv)"}, p.csv);
     visit({"evidence", "with --json: also the places that prove each item, and all bone removed unseen"}, p.evidence);
+    visit({"heat", "also how warm bone and structures became: runs the session again, which takes several times as long"}, p.heat);
+    visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+#ifdef OSTEO_WITH_MOVIE
+struct MovieCommand {
+  struct Params {
+    MovieCamera camera = MovieCamera::surgeon;
+    double speed = 1, from_s = 0, to_s = -1;
+    bool skip_idle = false, no_overlay = false, blind = false, deep = false;
+    std::string size = "1280x720";
+    int fps = 30;
+    std::string case_folder;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"camera", "surgeon: from where was looked (notes of the session); fixed: from one place, all that was drilled"}, p.camera);
+    visit({"speed", "times as fast as it was", "", 0.1, 100}, p.speed);
+    visit({"from_s", "of the session", "s", 0, 1e6}, p.from_s);
+    visit({"to_s", "of the session (-1: its end)", "s", -1, 1e6}, p.to_s);
+    visit({"skip_idle", "leave out where for over 2 s neither hand nor camera moves and no pedal is down"}, p.skip_idle);
+    visit({"no_overlay", "without time, force, nearest structure and volume removed"}, p.no_overlay);
+    visit({"blind", "for raters: no overlay, and with a folder as output a random name"}, p.blind);
+    visit({"size", "pixels, width and height, both even"}, p.size);
+    visit({"fps", "frames a second", "Hz", 1, 120}, p.fps);
+    visit({"deep", "creases shaded and edges smoothed, which without a graphics card takes several times as long"}, p.deep);
+    visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+#endif
+
+struct ReviewCommand {
+  struct Params {
+    std::string out;
+    std::string procedure;
+    bool mirror = false;
+    std::string reference;
+    std::string subject;
+    std::string earlier;
+    bool no_pictures = false;
+    std::string case_folder;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for review.html, review.pdf and review.json, made when it is not there (also -o)"}, p.out);
+    visit({"procedure", "what was to be done, as JSON (pipelines/procedures); empty: no items, regions or rules"}, p.procedure);
+    visit({"mirror", "the procedure is written for the other side of the body: its directions and curves turn about x = 0"}, p.mirror);
+    visit({"reference", "folder with reference.json and sessions of others on the same case; empty: no comparison"}, p.reference);
+    visit({"subject", "who this is, by the reference's code: sessions of the same person are left out of the comparison"}, p.subject);
+    visit({"earlier", "earlier sessions of the same person in their order, with commas between (empty: none)"}, p.earlier);
+    visit({"no_pictures", "without pictures and the view in 3D: needs no OpenGL"}, p.no_pictures);
     visit({"case_folder", "the case, when it was moved since (empty: where the session says)"}, p.case_folder);
   }
   static cli::CommandInfo info();
@@ -482,6 +727,7 @@ struct StudyCommand {
     std::string out;
     int resamples = 2000;
     double level = 0.95;
+    bool no_movies = false;
   };
   static void describe(Params& p, auto& visit) {
     visit({"title", "new: what the study is called"}, p.title);
@@ -501,6 +747,30 @@ struct StudyCommand {
     visit({"out", "analyse: files OUT.json, OUT.html and OUT.pdf (empty: STUDY/report; also -o)"}, p.out);
     visit({"resamples", "analyse: of each bootstrap", "", 100, 1000000}, p.resamples);
     visit({"level", "analyse: of intervals", "", 0.5, 0.999}, p.level);
+    visit({"no_movies", "demo: without the blinded movies (320x240, 15 times as fast, 10 frames a second, one a session)"}, p.no_movies);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct SimulateTraineeCommand {
+  struct Params {
+    std::string out;
+    std::string skill = "expert";
+    std::string procedure;
+    bool mirror = false;
+    double minutes = 3;
+    std::array<double, 3> approach{0, 0, 0};
+    double window_mm = 4.5;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder of the session (empty: CASE/sessions/N; also -o)"}, p.out);
+    visit({"skill", "expert or novice, then KEY=VALUE by commas, like 'novice, undercut=0.8'; what is not named is an expert's"}, p.skill);
+    visit({"procedure", "what is to be done, as JSON (pipelines/procedures)"}, p.procedure);
+    visit({"mirror", "the procedure is written for the other side of the body: its directions and curves turn about x = 0"}, p.mirror);
+    visit({"minutes", "then it stops, wherever it is", "min", 0.05, 60}, p.minutes);
+    visit({"approach", "from the bone to who drills, LPS (0,0,0: as the procedure's items have it)", "", -1e4, 1e4}, p.approach);
+    visit({"window_mm", "radius of what it opens, for the burr's middle", "mm", 1, 20}, p.window_mm);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

@@ -1,9 +1,10 @@
-// experiment: what a way of working costs a person, measured on a model of one.
+// experiment: what a way of working costs a person, measured on a model of one; and force-skill training, of people too.
 #include <cmath>
 #include <cstdio>
 #include <ostream>
 
 #include "commands.h"
+#include "experiment_force.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
@@ -14,18 +15,33 @@ namespace osteo {
 cli::CommandInfo ExperimentCommand::info() {
   return {
       "experiment",
-      "time to bring the camera to a view, by mode of control (simulated)",
-      "A model of a person, not a person: moves one after the other, each off by a share of its length, with times for looking, another "
-      "grip and keys (docs/camera.md has the numbers). It moves the window's own camera, from view to view, by mouse, by pointing at "
-      "bone, by a device that moves or turns the camera, by six degrees at once, by rates, and by views that were kept before. What "
-      "follows for people is for people to show: 'osteo rehearse CASE --experiment camera' times yours on the same kind of views.",
-      {{"which", "camera"}},
-      "osteo experiment camera"};
+      "force-skill training and its analysis; time to bring the camera to a view (simulated)",
+      "force-skill: 72 trials of learning a force along a path by hand (H), by eye (V) or by both (V+H), each tested by recall at once "
+      "(D. Morris 2006, chapter 4). FOLDER holds protocol.json (made where it is missing), and every tick and score of each participant; "
+      "stopped, it goes on at the trial that was not finished. With --simulated a program takes part. 'analyse' compares trainings within "
+      "people and writes report.html, .pdf and .json; 'stimuli' writes paths and forces as CSV and JSON; 'demo' is all of it by simulated "
+      "participants; 'null' counts what tests find where nothing is. docs/experiments.md defines every number.\n"
+      "camera: a model of a person moves the window's own camera from view to view, one move after the other, each off by a share of its "
+      "length, with times for looking, another grip and keys (docs/camera.md has the numbers). What follows for people is for people to "
+      "show: 'osteo rehearse CASE --experiment camera' times yours on the same kind of views.",
+      {{"which", "force-skill, analyse, stimuli, demo, null or camera"},
+       {"folder", "of force-skill training (force-skill: 'force-skill')", true}},
+      "osteo experiment demo -o FOLDER"};
 }
 
 int ExperimentCommand::run(const Params& p, cli::Invocation& io) {
-  if (io.arguments[0] != "camera")
-    throw Error(ExitCode::usage, "there is no experiment '" + io.arguments[0] + "'", "'camera' is the only one");
+  if (is_force_experiment(io.arguments[0])) return run_force_experiment(p, io);
+  if (io.arguments[0] != "camera") {
+    const std::vector<std::string> known{"force-skill", "analyse", "stimuli", "demo", "null", "camera"};
+    const std::string near = nearest_name(io.arguments[0], known);
+    throw Error(ExitCode::usage, "there is no experiment '" + io.arguments[0] + "'",
+                near.empty() ? "force-skill, analyse, stimuli, demo, null or camera" : "did you mean '" + near + "'?");
+  }
+  if (io.arguments.size() > 1) throw Error(ExitCode::usage, "'experiment camera' takes no folder: '" + io.arguments[1] + "'");
+  for (const char* const flag : {"participant", "people", "trials", "device", "headless", "simulated", "retention", "null", "experiments",
+                                 "chain", "level", "state_file"}) {
+    if (io.given.contains(flag)) throw Error(ExitCode::usage, "--" + std::string(flag) + " does nothing with 'experiment camera'");
+  }
   if (!p.out.empty() && fs::exists(p.out) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + p.out + "' exists already", "--force replaces it");
   // As a temporal bone begins in the window.

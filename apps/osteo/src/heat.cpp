@@ -60,13 +60,7 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   for (const std::string& line : r.losses) io.err << "session: " << line << '\n';
   if (!r.identical) io.err << "session: it did not come out as it was recorded (" << r.difference << "): neither may its heat\n";
   if (!io.common.quiet && !io.common.json) {
-    io.out << "warmest bone " << format_number(tenths(heat.hottest_c())) << " C; " << format_number(tenths(l.added_j))
-           << " J into bone, of which " << format_number(tenths(l.chips_j)) << " left with chips, " << format_number(tenths(l.cooled_j))
-           << " into water\n";
-    for (const auto& [value, s] : heat.structures())
-      io.out << anatomy.structures->name_of(value) << ": " << format_number(tenths(s.worst.peak_c)) << " C at most, "
-             << format_number(minutes(s.worst.cem43_min)) << " min at 43 C" << (s.worst.coagulated ? ", COAGULATED" : "") << '\n';
-    if (!anatomy.structures) io.out << "the case lists no structures at risk\n";
+    for (const std::string& line : told(heat, anatomy.structures.get())) io.out << line << '\n';
     io.out << "by assumption: " << format_number(p.cutting_share) << " of a cutting burr's work, " << format_number(p.diamond_w_per_n)
            << " W per N of a diamond burr\n";
   }

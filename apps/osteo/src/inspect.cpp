@@ -22,6 +22,19 @@
 namespace osteo {
 namespace {
 
+Json triple(Vec3 v);
+
+Json bounds(const auto& points_mm) {
+  Vec3 lo{1e300, 1e300, 1e300}, hi = lo * -1;
+  for (const auto& p : points_mm) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      lo[a] = std::min(lo[a], static_cast<double>(p[a]));
+      hi[a] = std::max(hi[a], static_cast<double>(p[a]));
+    }
+  }
+  return {triple(lo), triple(hi)};
+}
+
 Json triple(Vec3 v) {
   return {v.x, v.y, v.z};
 }
@@ -65,14 +78,7 @@ void describe_data(Json& j, const Data& data) {
     j["manifold"] = c.manifold();
     j["area_mm2"] = area_mm2(mesh);
     if (c.watertight()) j["volume_mm3"] = enclosed_volume_mm3(mesh);
-    Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
-    for (const auto& p : mesh.points_mm) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], static_cast<double>(p[a]));
-        hi[a] = std::max(hi[a], static_cast<double>(p[a]));
-      }
-    }
-    j["bounds_mm"] = {triple(lo), triple(hi)};
+    j["bounds_mm"] = bounds(mesh.points_mm);
   } else if (const auto* tets = std::get_if<Tets>(&data)) {
     const TetQuality q = tet_quality(**tets);
     j["points"] = q.points;
@@ -83,6 +89,7 @@ void describe_data(Json& j, const Data& data) {
     j["min_dihedral_deg"] = q.min_dihedral_deg;
     j["max_dihedral_deg"] = q.max_dihedral_deg;
     j["min_aspect"] = q.min_aspect;
+    j["bounds_mm"] = bounds((*tets)->points_mm);
   } else if (const auto* picture = std::get_if<Picture>(&data)) {
     j["width"] = picture->width;
     j["height"] = picture->height;

@@ -64,7 +64,7 @@ cli::CommandInfo DocsCommand::info() {
   return {"docs",
           "write the reference pages, the schema and the completion",
           "All of them are made from the declarations of the stages and commands.",
-          {{"folder", "usually docs/reference"}},
+          {{"folder", "usually docs/reference; with --shared the folder 'share' of an installation"}},
           "osteo docs docs/reference"};
 }
 
@@ -106,6 +106,17 @@ std::string actions_page() {
 
 int DocsCommand::run(const Params& p, cli::Invocation& io) {
   const fs::path folder = io.arguments[0];
+  if (p.shared) {
+    if (p.check) throw Error(ExitCode::usage, "--check is for the reference pages, not for --shared", "leave one of them out");
+    for (const auto& [name, content] : cli::shared_files(make_osteo_program())) {
+      const fs::path path = folder / name;
+      make_output_folder(path.parent_path());
+      write_file(path, content);
+      if (!content.starts_with("#!")) continue;
+      fs::permissions(path, fs::perms::owner_exec | fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
+    }
+    return 0;
+  }
   int stale = 0;
   auto pages = cli::reference_pages(make_osteo_program());
   pages["script.schema.json"] = script_schema();

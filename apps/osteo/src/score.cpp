@@ -7,7 +7,9 @@
 #include "commands.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/scene/heat_score.h"
 #include "osteo/scene/session_folder.h"
+#include "osteo/session/simulated.h"
 
 namespace osteo {
 
@@ -30,6 +32,9 @@ Reference load_sessions(const fs::path& folder, const SessionFolder& mine, const
   const std::vector<ReferenceSession> list = load_reference(folder);
   for (std::size_t n = 0; n < list.size(); ++n) {
     const SessionFolder other = open_session_folder(folder / list[n].session, mine.case_folder);
+    if (!other.guided.empty())
+      throw Error(ExitCode::usage, "session '" + list[n].session + "' of the reference is no work of its own: " + other.guided,
+                  "a reference is of unaided sessions: leave it out of reference.json");
     const SessionReader session(other.stream(), Damage::keep);
     World begin = world_at_begin(other, the_case, anatomy, context);
     if (begin.hash() != bone_hash || session.header().bone_hash != bone_hash)
@@ -39,6 +44,20 @@ Reference load_sessions(const fs::path& folder, const SessionFolder& mine, const
     reference.sessions.push_back(read_reference(session, std::move(begin), anatomy.structures.get(), list[n]));
   }
   return reference;
+}
+
+}  // namespace
+
+namespace {
+
+void add_heat(const SessionReader& session, World begin, const Anatomy& anatomy, Score& score, const Context& context) {
+  HeatReader heat(begin, anatomy.structures.get(), session.header().rate_hz);
+  Reader* const readers[] = {&heat};
+  const ReplayResult again = replay(session, std::move(begin), anatomy, context, readers);
+  for (Measured& m : heat_values(heat, anatomy.structures.get())) score.values.push_back(std::move(m));
+  if (!again.identical)
+    score.words.push_back("run again it did not come out as it was recorded (" + again.difference + "): neither may its heat");
+  if (again.ticks_repeated < again.ticks) score.words.push_back("heat is known only up to where the first ticks are missing");
 }
 
 }  // namespace
@@ -58,23 +77,37 @@ int ScoreCommand::run(const Params& p, cli::Invocation& io) {
   if (!p.csv.empty() && fs::exists(p.csv) && !io.common.force)
     throw Error(ExitCode::cannot_write, "'" + p.csv + "' exists already", "--force replaces it");
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
+  // Scores of guided sessions never stand among those of unaided ones: neither compared nor in a table.
+  if (!folder.guided.empty() && (!p.reference.empty() || !p.csv.empty()))
+    throw Error(ExitCode::usage, "this session is no work of its own: " + folder.guided,
+                "score it without --reference and --csv; sessions that nobody guided may be compared");
   const Case the_case = load_case(folder.case_folder);
+  const SessionReader session(folder.stream(), Damage::keep);
+  // Hardness matters to who runs it again.
   HapticSetup setup;
   setup.hardness = false;
+  if (p.heat) setup = session.header().haptics;
   const Anatomy anatomy = anatomy_of(the_case, setup, io.context);
-  const SessionReader session(folder.stream(), Damage::keep);
   World begin = world_at_begin(folder, the_case, anatomy, io.context);
+  std::optional<World> again;
+  if (p.heat) again = begin.copy();
   std::optional<Reference> reference;
   if (!p.reference.empty())
     reference = load_sessions(p.reference, folder, the_case, anatomy, session.header().bone_hash, io.context.sub(0, 0.5));
-  Score score = score_session(session, std::move(begin), anatomy.structures.get(), procedure ? &*procedure : nullptr,
-                              reference ? &*reference : nullptr, p.subject, io.context.sub(p.reference.empty() ? 0 : 0.5, 1));
+  Score score =
+      score_session(session, std::move(begin), anatomy.structures.get(), procedure ? &*procedure : nullptr,
+                    reference ? &*reference : nullptr, p.subject, io.context.sub(p.reference.empty() ? 0 : 0.5, p.heat ? 0.6 : 1));
+  if (again) add_heat(session, std::move(*again), anatomy, score, io.context.sub(0.6, 1));
   if (session.header().haptics.structures != setup.structures)
     score.words.push_back("the case's structures are not those that the session watched: they are measured as the case has them now");
+  if (!folder.guided.empty()) score.words.push_back("guided: " + folder.guided + "; not to be compared with unaided sessions");
+  if (std::string words = simulated_words(session); !words.empty()) score.words.insert(score.words.begin(), std::move(words));
   io.end_progress();
   if (!p.csv.empty()) write_file(p.csv, score_csv(score, folder.folder.filename().string()));
   if (io.common.json) {
-    io.out << score_json(score, p.evidence).dump(2) << '\n';
+    Json j = score_json(score, p.evidence);
+    if (!folder.guided.empty()) j["guided"] = folder.guided;
+    io.out << j.dump(2) << '\n';
   } else {
     io.out << score_lines(score);
   }

@@ -11,6 +11,7 @@
 #include "osteo/report/sheet.h"
 #include "osteo/study/analysis.h"
 #include "osteo/study/study.h"
+#include "study_demo.h"
 
 namespace osteo {
 namespace {
@@ -39,6 +40,7 @@ const std::map<std::string, std::set<std::string>>& flags_of_actions() {
       {"form", {"rater"}},
       {"rate", {}},
       {"analyse", {"out", "resamples", "level"}},
+      {"demo", {"out", "resamples", "level", "no_movies"}},
   };
   return flags;
 }
@@ -52,7 +54,7 @@ void need_known(const cli::Invocation& io, const std::string& action) {
   }
   if (!flags_of_actions().contains(action)) {
     const std::string near = nearest_name(action, actions);
-    throw Error(ExitCode::usage, "'" + action + "' is nothing that a study can do: new, add, order, form, rate or analyse",
+    throw Error(ExitCode::usage, "'" + action + "' is nothing that a study can do: new, add, order, form, rate, analyse or demo",
                 near.empty() ? "" : "did you mean '" + near + "'?");
   }
   for (const std::string& flag : io.given) {
@@ -83,10 +85,13 @@ cli::CommandInfo StudyCommand::info() {
       "the metrics of a session; 'order' draws who does which case when; 'form' writes a page to rate sessions with, in any browser and "
       "without a network; 'rate' takes what it saved; 'analyse' writes what the study shows: agreement of raters, differences of groups "
       "with effect sizes and intervals, correlation of metrics with ratings, ROC, pass marks and power, as JSON, HTML and PDF. What "
-      "there is too little for is not computed, and the report says why. Random choices follow the study's own seed, given to 'new'. "
+      "there is too little for is not computed, and the report says why. 'demo' makes a whole study by simulated trainees, labelled so, "
+      "with "
+      "blinded movies and forms for raters (--no-movies leaves the movies out, as does a build without them); "
+      "stopped and begun again it goes on where it was. Random choices follow the study's own seed, given to 'new'. "
       "docs/study.md defines every number and says what may not be concluded.",
-      {{"action", "new, add, order, form, rate or analyse"},
-       {"study", "its folder"},
+      {{"action", "new, add, order, form, rate, analyse or demo"},
+       {"study", "its folder; of a demo also by -o", true},
        {"file", "add: metrics of a session (.json, .csv); rate: ratings that the form saved", true}},
       "osteo study analyse STUDY"};
 }
@@ -94,6 +99,13 @@ cli::CommandInfo StudyCommand::info() {
 int StudyCommand::run(const Params& p, cli::Invocation& io) {
   const std::string action = io.arguments[0];
   need_known(io, action);
+  if (action == "demo") {
+    if (io.arguments.size() > 1 && !p.out.empty()) throw Error(ExitCode::usage, "the demo's folder is given twice", "leave -o out");
+    if (io.arguments.size() < 2 && p.out.empty()) throw Error(ExitCode::usage, "the demo needs a folder", "osteo study demo -o FOLDER");
+    return run_study_demo(io.arguments.size() > 1 ? io.arguments[1] : p.out, p.resamples, p.level, !p.no_movies, io);
+  }
+  if (io.arguments.size() < 2)
+    throw Error(ExitCode::usage, "'study " + action + "' needs the study's folder", "osteo study " + action + " STUDY");
   const fs::path folder = io.arguments[1];
   if (io.given.contains("seed") && action != "new")
     throw Error(ExitCode::usage, "--seed does nothing here: the study has its own", "it is in " + (folder / "study.json").string());
@@ -124,6 +136,9 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     said = code + " is in " + p.group;
   } else if (action == "add") {
     if (io.given.contains("group")) throw Error(ExitCode::usage, "--group is of a participant, not of a session");
+    // What score --json says of a session that another hand led.
+    if (const auto metrics = Json::parse(read_text(io.arguments[2])); metrics && metrics->find("guided") != nullptr)
+      throw Error(ExitCode::usage, "'" + io.arguments[2] + "' is of a guided session", "a study compares sessions that nobody guided");
     const std::string blind = study::add_session(folder, p.participant, p.case_name, p.attempt, io.arguments[2], notes);
     done["blind"] = blind;
     said = "raters know the session as " + blind + ": its movie goes to " + (folder / "movies" / (blind + ".mp4")).string();

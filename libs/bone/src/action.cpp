@@ -33,6 +33,9 @@ constexpr ActionValue kSoftPush[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_
                                      {"normal_y", "1"}, {"normal_z", "1"}, {"force", "N"}, {"stiffness", "N/mm"}};
 constexpr ActionValue kSetting[] = {{"value", "as the setting's"}};
 
+constexpr ActionValue kGuide[] = {{"hand", "1"}, {"stiffness", "N/mm"}, {"damping", "N s/m"}, {"forward", "1"},
+                                  {"most", "N"}, {"dead_zone", "mm"},   {"own_contact", "1"}, {"brake", "N s/m"}};
+
 constexpr auto kLast = static_cast<std::size_t>(ActionKind::behind_last) - 1;
 constexpr std::array<ActionRow, kLast> kTable{{
     {.kind = ActionKind::hold, .name = "hold", .help = "nothing is removed from here on"},
@@ -143,6 +146,11 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .last_counts = true,
      .moves_dust = true,
      .values = kPosture},
+    {.kind = ActionKind::guide,
+     .name = "guide",
+     .help = "one hand is led by another from here on: by a spring, a damper and the force that the other feels",
+     .item = "which hand leads",
+     .values = kGuide},
 }};
 
 // A kind without its row, or out of order, does not compile.

@@ -365,13 +365,4 @@ void Dust::visit_liquid(const std::function<void(Ijk, double, double)>& f) const
   }
 }
 
-double Dust::wetness(Vec3 world_mm) const {
-  if (!wet_) return 0;
-  const Vec3 x = bone_.frame().index_from_world(world_mm);
-  const Ijk c{static_cast<int>(std::floor(x.x + 0.5)), static_cast<int>(std::floor(x.y + 0.5)), static_cast<int>(std::floor(x.z + 0.5))};
-  const auto found = index_.find(key(c.i >> 3, c.j >> 3, c.k >> 3));
-  if (found == index_.end() || !bricks_[found->second]->water) return 0;
-  return std::min(1.0, bricks_[found->second]->water->units[BrickGrid::offset_in_brick(c.i, c.j, c.k)] / double{kFilmUnits});
-}
-
 }  // namespace osteo

@@ -12,7 +12,8 @@ std::uint32_t both(std::uint32_t a, std::uint32_t b) {
 }
 
 // Of a voxel below a half: who most of its solid neighbours belong to, the first of equals; a crumb without any.
-std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& components, std::span<const std::uint32_t> piece_of, VoxelKey key) {
+std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& components, std::span<const std::uint32_t> piece_of,
+                            VoxelKey key) {
   std::array<std::uint32_t, 26> near;
   std::size_t n = 0;
   const Ijk c = bone.coordinate(key);
@@ -35,6 +36,11 @@ std::uint32_t nearest_owner(const BrickGrid& bone, const LiveComponents& compone
     i = j;
   }
   return owner;
+}
+
+bool holds_bone(const BrickGrid& bone, std::uint32_t brick) {
+  const float* const v = bone.values_of_brick(brick);
+  return std::any_of(v, v + BrickGrid::kVoxels, [](float density) { return density > 0; });
 }
 
 template <class F>
@@ -97,6 +103,16 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
     if (near[b] == 0) continue;
     in_brick.clear();
     std::uint32_t whose = kNobody;
+    // Most bricks are of one piece alone.
+    if (near[b] != kSeveral && near[b] != kCrumb) {
+      if (holds_bone(bone, b)) {
+        whose = near[b];
+        bricks[whose].push_back(bone.brick_coordinate(b));
+        split.changed_bricks.push_back(b);
+      }
+      around[b] = whose;
+      continue;
+    }
     for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
       const VoxelKey key = b * BrickGrid::kVoxels + v;
       const float density = bone.value(key);
@@ -120,10 +136,8 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
     around[b] = whose;
     if (whose != 0 && whose != kNobody) split.changed_bricks.push_back(b);
   }
-  split.pieces[0].bone = BrickGrid(bone);
-  for (const std::uint32_t b : split.changed_bricks) {
-    for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) split.pieces[0].bone.set(b * BrickGrid::kVoxels + v, 0);
-  }
+  split.pieces[0].bone = bone.sharing();
+  split.pieces[0].bone.empty_bricks(split.changed_bricks);
   for (std::uint32_t p = 1; p < count; ++p) {
     Piece& piece = split.pieces[p];
     piece.bone = BrickGrid(bone.frame(), std::move(bricks[p]));
@@ -134,10 +148,7 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
       bool unchanged = true;
       for_neighbours(bone, from, [&](std::uint32_t n) { unchanged = unchanged && both(around[n], p) == p; });
       piece.origin.unchanged.push_back(unchanged ? 1 : 0);
-      if (around[from] != p) continue;
-      for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
-        piece.bone.set(b * BrickGrid::kVoxels + v, bone.value(from * BrickGrid::kVoxels + v));
-      }
+      if (around[from] == p) piece.bone.share_brick(b, bone, from);
     }
   }
   for (const auto& [key, p] : apart) {

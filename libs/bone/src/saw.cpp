@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace osteo {
 namespace {
@@ -53,6 +54,7 @@ double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& chan
     const Ijk o = bone.brick_coordinate(b);
     const Vec3 middle = Vec3{o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5} - centre;
     if (std::any_of(sides.begin(), sides.end(), [&](const Side& s) { return std::abs(dot(middle, s.axis)) > s.half + kCorner; })) continue;
+    bool own = false;
     for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
       const VoxelKey key = b * BrickGrid::kVoxels + v;
       const float before = bone.value(key);
@@ -68,6 +70,7 @@ double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& chan
       }
       const float after = std::max(0.0F, before * static_cast<float>(1 - covered));
       if (covered <= 0 || after == before) continue;
+      if (!std::exchange(own, true)) bone.own_brick(b);
       bone.set(key, after);
       changed.push_back(key);
       removed += static_cast<double>(before - after);

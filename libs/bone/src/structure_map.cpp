@@ -240,6 +240,11 @@ StructureMap::Answer StructureMap::at(Vec3 world_mm) const noexcept {
   return clearance({0, 0, 0, 0}, world_mm, {0, 0, 1});
 }
 
+double StructureMap::distance_mm(std::size_t number, Vec3 world_mm) const noexcept {
+  const double d = parts_[number].at(world_mm);
+  return d < reach_mm_ ? d : reach_mm_;
+}
+
 StructureMap::Answer StructureMap::clearance(const RoundCone& tool, Vec3 start_mm, Vec3 axis, std::span<double> each) const noexcept {
   const Vec3 middle = start_mm + axis * (tool.start_mm + tool.length_mm / 2);
   const double reach = reach_mm_ + tool.length_mm / 2 + tool.largest_radius_mm();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -249,6 +250,15 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
     case ActionKind::soft_push:
     case ActionKind::setting:
       break;
+    case ActionKind::guide:
+      if (!(a.values[0] >= 0 && a.values[0] < kMostHands && a.values[0] == std::floor(a.values[0])) || a.item >= kMostHands ||
+          static_cast<double>(a.item) == a.values[0])
+        return nothing("one hand is led by another, both below " + std::to_string(kMostHands));
+      if (!(a.values[1] >= -10 && a.values[1] <= 10 && a.values[2] >= 0 && a.values[2] <= 100 && std::abs(a.values[3]) <= 2 &&
+            a.values[4] >= 0 && a.values[4] <= 20 && a.values[5] >= 0 && (a.values[6] == 0 || a.values[6] == 1) && a.values[7] >= 0 &&
+            a.values[7] <= 100))
+        return nothing("a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force");
+      break;
     case ActionKind::saw:
       return saw(a);
     case ActionKind::split:
@@ -342,8 +352,7 @@ World::Effect World::saw(const SceneAction& a) {
     own.at_mm = back(cut.at_mm);
     own.normal = back.rotation * cut.normal;
     own.along = back.rotation * cut.along;
-    auto sawn =
-        std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, BrickGrid(placed.body->bone), placed.body->hardness});
+    auto sawn = std::make_shared<Body>(Body{placed.body->id, placed.body->first_brick, placed.body->bone.sharing(), placed.body->hardness});
     std::vector<VoxelKey> changed;
     apply_saw(sawn->bone, own, changed);
     if (changed.empty()) continue;
@@ -424,45 +433,72 @@ World::Effect World::undo() {
   done_.pop_back();
   told_ = std::min(told_, done_.size());
   stroke_bytes_ -= last.drilled.size() * sizeof(Change);
-  // New grids in place of those that get density back.
-  std::vector<std::pair<std::uint32_t, std::vector<std::uint32_t>>> touched;
-  const auto renewed = [&](std::uint32_t id) -> std::pair<Body*, std::vector<std::uint32_t>*> {
-    for (auto& [body, bricks] : touched) {
-      if (body == id) return {find(id)->body.get(), &bricks};
+  // New grids in place of those that get density back; what does not change they share with the old.
+  struct Renewed {
+    std::uint32_t id;
+    Body* body;
+    std::vector<std::uint32_t> bricks;  // that changed
+    std::vector<std::uint8_t> own;      // one a brick: it may be written
+    void note(std::uint32_t brick) {
+      if (bricks.empty() || bricks.back() != brick) bricks.push_back(brick);
+    }
+    void write(VoxelKey v, float density) {
+      const std::uint32_t brick = v / BrickGrid::kVoxels;
+      note(brick);
+      if (std::exchange(own[brick], 1) == 0) body->bone.own_brick(brick);
+      body->bone.set(v, density);
+    }
+  };
+  std::deque<Renewed> touched;
+  const auto renewed = [&](std::uint32_t id) -> Renewed& {
+    if (!touched.empty() && touched.back().id == id) return touched.back();
+    for (Renewed& r : touched) {
+      if (r.id == id) return r;
     }
     PlacedBody* const old = placed(id);
-    old->body = std::make_shared<Body>(Body{id, old->body->first_brick, BrickGrid(old->body->bone), old->body->hardness});
-    touched.emplace_back(id, std::vector<std::uint32_t>());
-    return {old->body.get(), &touched.back().second};
+    old->body = std::make_shared<Body>(Body{id, old->body->first_brick, old->body->bone.sharing(), old->body->hardness});
+    touched.push_back({id, old->body.get(), {}, std::vector<std::uint8_t>(old->body->bone.brick_count())});
+    return touched.back();
   };
-  const auto give_back = [&](std::uint32_t id, VoxelKey v, float density) {
-    const auto [body, bricks] = renewed(id);
-    body->bone.set(v, std::clamp(body->bone.value(v) + density, 0.0F, 1.0F));
-    if (bricks->empty() || bricks->back() != v / BrickGrid::kVoxels) bricks->push_back(v / BrickGrid::kVoxels);
+  const auto holds_bone = [](const BrickGrid& bone, std::uint32_t brick) {
+    const float* const v = bone.values_of_brick(brick);
+    return std::any_of(v, v + BrickGrid::kVoxels, [](float density) { return density > 0; });
   };
   for (const auto& [child, parent] : last.children) {
     const PlacedBody piece = *find(child);
     const BrickGrid& from = piece.body->bone;
-    const std::shared_ptr<const Body> whole = find(parent)->body;  // kept: what is given back goes into a new one, with the same bricks
-    for (VoxelKey v = 0; v < from.brick_count() * BrickGrid::kVoxels; ++v) {
-      const float density = from.value(v);
-      if (density <= 0) continue;
-      const Ijk c = from.coordinate(v);
-      give_back(parent, whole->bone.find(c.i, c.j, c.k), density);
+    for (std::uint32_t b = 0; b < from.brick_count(); ++b) {
+      if (!holds_bone(from, b)) continue;
+      Renewed& whole = renewed(parent);
+      BrickGrid& to = whole.body->bone;
+      const Ijk o = from.brick_coordinate(b);
+      const std::uint32_t there = to.find_brick(o.i, o.j, o.k);
+      if (!holds_bone(to, there)) {
+        to.share_brick(there, from, b);
+        whole.own[there] = 0;
+        whole.note(there);
+        continue;
+      }
+      for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
+        const VoxelKey at = there * BrickGrid::kVoxels + v;
+        if (const float density = from.value(b * BrickGrid::kVoxels + v); density > 0)
+          whole.write(at, std::min(to.value(at) + density, 1.0F));
+      }
     }
     bodies_.erase(bodies_.begin() + (find(child) - bodies_.data()));
     effect.gone.push_back(child);
   }
   for (const auto& [name, density] : last.loose) {
     const PlacedBody* const b = owner(name);
-    give_back(b->body->id, name - b->body->name_of(0), density);
+    const VoxelKey own = name - b->body->name_of(0);
+    Renewed& to = renewed(b->body->id);
+    to.write(own, std::min(to.body->bone.value(own) + density, 1.0F));
   }
   const auto take_back = [&](std::uint32_t id, VoxelKey own, const Change& c) {
-    const auto [body, bricks] = renewed(id);
-    const float now = body->bone.value(own);
+    Renewed& to = renewed(id);
+    const float now = to.body->bone.value(own);
     // To the bit where nothing was drilled since.
-    give_back(id, own, 0);
-    body->bone.set(own, now == c.after ? c.before : std::clamp(now + c.before - c.after, 0.0F, 1.0F));
+    to.write(own, now == c.after ? c.before : std::clamp(now + c.before - c.after, 0.0F, 1.0F));
   };
   for (const auto& [id, changes] : last.sawn) {
     for (const Change& c : changes) take_back(id, c.voxel, c);
@@ -475,10 +511,10 @@ World::Effect World::undo() {
     if (PlacedBody* const b = placed(id); b != nullptr) b->world_from_body = pose;
   }
   if (last.kind != ActionKind::stroke) fixtures_ = last.fixtures;
-  for (auto& [id, bricks] : touched) {
-    std::sort(bricks.begin(), bricks.end());
-    bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
-    effect.changed.push_back({id, std::move(bricks)});
+  for (Renewed& r : touched) {
+    std::sort(r.bricks.begin(), r.bricks.end());
+    r.bricks.erase(std::unique(r.bricks.begin(), r.bricks.end()), r.bricks.end());
+    effect.changed.push_back({r.id, std::move(r.bricks)});
   }
   return effect;
 }

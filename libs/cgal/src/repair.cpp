@@ -3,10 +3,9 @@
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
-#include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/box_intersection_d.h>
 
 #include <algorithm>
 
@@ -78,9 +77,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> self_intersections(const Tr
   return found;
 }
 
-TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, bool remove_self_intersections, CgalRepairReport& report,
-                              const Context& context) {
-  report = {};
+TriangleSoup holes_closed(const TriangleSoup& surface, int max_hole_edges, CgalRepairReport& report, const Context& context) {
+  report.holes_filled = report.holes_left = 0;
   const Ordered used = ordered(surface, context);
   std::vector<K::Point_3> points;
   for (const Vec3 p : used.soup.points_mm) points.emplace_back(p.x, p.y, p.z);
@@ -89,10 +87,9 @@ TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, b
   PMP::orient_polygon_soup(points, triangles);  // doubles points where the surface is not manifold
   Mesh mesh;
   PMP::polygon_soup_to_polygon_mesh(points, triangles, mesh);
-  const auto fill = [&] {
+  try {
     std::vector<Mesh::Halfedge_index> borders;
     PMP::extract_boundary_cycles(mesh, std::back_inserter(borders));
-    report.holes_left = 0;
     for (const auto h : borders) {
       context.check_cancelled();
       int edges = 0;
@@ -107,23 +104,6 @@ TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, b
       } else {
         ++report.holes_filled;
       }
-    }
-  };
-  const auto count = [&] {
-    std::vector<std::pair<Face, Face>> pairs;
-    PMP::self_intersections(mesh, std::back_inserter(pairs));
-    return static_cast<std::uint64_t>(pairs.size());
-  };
-  try {
-    context.progress(0.2, "filling holes");
-    fill();
-    context.progress(0.5, "taking out self-intersections");
-    report.self_intersections_before = report.self_intersections_after = count();
-    if (remove_self_intersections && report.self_intersections_before > 0) {
-      PMP::experimental::remove_self_intersections(mesh);
-      mesh.collect_garbage();
-      fill();
-      report.self_intersections_after = count();
     }
   } catch (const CGAL::Failure_exception& e) {
     throw Error(ExitCode::failed, std::string("CGAL failed: ") + e.what());

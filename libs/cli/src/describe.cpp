@@ -68,9 +68,14 @@ void field_rows(std::ostream& out, const std::vector<FieldRef>& fields) {
     if (const std::string c = choices_text(f); !c.empty()) facts += c;
     if (const std::string r = range_text(f); !r.empty()) facts += r;
     const std::string value = f.to_text();
-    if (f.kind() != "flag" && !value.empty()) facts += (facts.empty() ? "" : "; ") + std::string("default ") + value;
+    if (f.kind() == "flag") {
+      facts = value == "true" ? "default: on" : "default: off";
+    } else if (!value.empty()) {
+      facts += (facts.empty() ? "" : "; ") + std::string("default ") + value;
+    }
     if (!facts.empty()) text += " [" + facts + "]";
-    row(out, flag_text(f), text);
+    // What is on by itself can only be turned off.
+    row(out, f.kind() == "flag" && value == "true" ? "--no-" + f.flag().substr(2) : flag_text(f), text);
   }
 }
 
@@ -104,41 +109,11 @@ std::string markdown_fields(const std::vector<FieldRef>& fields) {
   for (const FieldRef& f : fields) {
     std::string range = choices_text(f);
     if (range.empty()) range = range_text(f);
-    text += "| `" + f.flag() + "` | `" + std::string(f.doc.name) + "` | " + (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " +
-            range + " | " + std::string(f.doc.help) + " |\n";
+    const std::string off = f.kind() == "flag" && f.to_text() == "true" ? " / `--no-" + f.flag().substr(2) + "`" : "";
+    text += "| `" + f.flag() + "`" + off + " | `" + std::string(f.doc.name) + "` | " +
+            (f.to_text().empty() ? "" : "`" + f.to_text() + "`") + " | " + range + " | " + std::string(f.doc.help) + " |\n";
   }
   return text;
-}
-
-std::string escape_xml(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else
-      out += c;
-  }
-  return out;
-}
-
-std::string title_case(std::string name) {
-  bool up = true;
-  for (char& c : name) {
-    if (up) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    up = c == '-' || c == '_';
-    if (up) c = ' ';
-  }
-  return name;
-}
-
-std::vector<FieldRef> common_fields() {
-  static Common::Params params;
-  params = {};
-  return fields_of<Common>(params);
 }
 
 Json schema_of(const FieldRef& f) {
@@ -151,6 +126,12 @@ Json or_variable(const Json& schema) {
 }
 
 }  // namespace
+
+std::vector<FieldRef> common_fields() {
+  static Common::Params params;
+  params = {};
+  return fields_of<Common>(params);
+}
 
 std::string flag_text(const FieldRef& field) {
   const std::string_view kind = field.kind();
@@ -228,69 +209,6 @@ std::string command_help(Command& command) {
   return out.str();
 }
 
-std::string stage_xml(Stage& stage) {
-  const StageInfo& info = stage.info();
-  std::ostringstream out;
-  out << "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<executable>\n  <category>Osteotome</category>\n  <title>"
-      << escape_xml(title_case(info.name)) << "</title>\n  <description>" << escape_xml(info.description) << "</description>\n  <version>"
-      << info.version << "</version>\n";
-  const auto tag_of = [](DataKind kind) {
-    switch (kind) {
-      case DataKind::image:
-      case DataKind::labels:
-        return "image";
-      case DataKind::surface:
-        return "geometry";
-      case DataKind::source:
-        return "directory";
-      default:
-        return "file";
-    }
-  };
-  out << "  <parameters>\n    <label>Input and output</label>\n";
-  int index = 0;
-  const auto port = [&](const Port& p, const char* channel, const std::string& flag) {
-    const std::string tag = tag_of(p.kinds.front());
-    out << "    <" << tag;
-    if (p.kinds.front() == DataKind::labels) out << " type=\"label\"";
-    out << ">\n      <name>" << p.name << (std::string(channel) == "output" ? "_out" : "") << "</name>\n      <label>"
-        << escape_xml(title_case(p.name)) << "</label>\n      <channel>" << channel << "</channel>\n";
-    if (p.optional)
-      out << "      <longflag>" << flag << "</longflag>\n";
-    else
-      out << "      <index>" << index++ << "</index>\n";
-    out << "      <description>" << escape_xml(p.help) << "</description>\n    </" << tag << ">\n";
-  };
-  for (const Port& p : info.inputs) port(p, "input", "--" + p.name);
-  for (const Port& p : info.outputs) port(p, "output", output_flag(p));
-  out << "  </parameters>\n";
-  const auto fields = stage.fields();
-  if (!fields.empty()) out << "  <parameters>\n    <label>Parameters</label>\n";
-  for (const FieldRef& f : fields) {
-    const std::string_view kind = f.kind();
-    const std::string tag = kind == "flag"     ? "boolean"
-                            : kind == "int"    ? "integer"
-                            : kind == "number" ? "double"
-                            : kind == "choice" ? "string-enumeration"
-                            : kind == "triple" ? "double-vector"
-                                               : "string";
-    out << "    <" << tag << ">\n      <name>" << f.doc.name << "</name>\n      <label>" << escape_xml(title_case(std::string(f.doc.name)))
-        << "</label>\n      <longflag>" << f.flag() << "</longflag>\n      <description>" << escape_xml(f.doc.help)
-        << "</description>\n      <default>" << escape_xml(f.to_text()) << "</default>\n";
-    if (const auto* c = std::get_if<FieldRef::Choice>(&f.target)) {
-      for (const auto name : c->names) out << "      <element>" << name << "</element>\n";
-    }
-    if ((kind == "int" || kind == "number") && std::isfinite(f.doc.lo) && std::isfinite(f.doc.hi)) {
-      out << "      <constraints><minimum>" << format_number(f.doc.lo) << "</minimum><maximum>" << format_number(f.doc.hi)
-          << "</maximum></constraints>\n";
-    }
-    out << "    </" << tag << ">\n";
-  }
-  if (!fields.empty()) out << "  </parameters>\n";
-  out << "</executable>\n";
-  return out.str();
-}
-
 std::string stage_json(Stage& stage) {
   const StageInfo& info = stage.info();
   Json j;
@@ -359,50 +277,6 @@ std::string pipeline_schema(const Program& program) {
   }
   p["stages"] = {{"type", "array"}, {"items", {{"oneOf", any}}}};
   return root.dump(2) + "\n";
-}
-
-std::string bash_completion(const Program& program) {
-  std::ostringstream out;
-  out << "# bash completion of osteo: source it, or put it into /etc/bash_completion.d\n_osteo() {\n  local cur=${COMP_WORDS[COMP_CWORD]} "
-         "prev=${COMP_WORDS[COMP_CWORD-1]}\n"
-      << "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n    COMPREPLY=($(compgen -W \"";
-  for (const auto& name : program.registry.names()) out << name << ' ';
-  for (const auto& c : program.commands) out << c->info().name << ' ';
-  out << "help --version\" -- \"$cur\"))\n    return\n  fi\n  case \"${COMP_WORDS[1]} $prev\" in\n";
-  const auto choices = [&](const std::string& name, const std::vector<FieldRef>& fields) {
-    for (const FieldRef& f : fields) {
-      const auto* c = std::get_if<FieldRef::Choice>(&f.target);
-      if (c == nullptr) continue;
-      out << "    \"" << name << ' ' << f.flag() << "\") COMPREPLY=($(compgen -W \"";
-      for (const auto v : c->names) out << v << ' ';
-      out << "\" -- \"$cur\")); return ;;\n";
-    }
-  };
-  for (const auto& name : program.registry.names()) choices(name, program.registry.make(name)->fields());
-  for (const auto& c : program.commands) choices(c->info().name, c->fields());
-  out << "  esac\n  local flags=\"";
-  for (const FieldRef& f : common_fields()) out << f.flag() << ' ';
-  out << "--help\"\n  case \"${COMP_WORDS[1]}\" in\n";
-  for (const auto& name : program.registry.names()) {
-    const auto stage = program.registry.make(name);
-    out << "    " << name << ") flags=\"$flags --xml --describe";
-    for (const FieldRef& f : stage->fields()) out << ' ' << f.flag();
-    for (const Port& p : stage->info().inputs) {
-      if (p.optional) out << " --" << p.name;
-    }
-    for (const Port& p : stage->info().outputs) {
-      if (p.optional) out << ' ' << output_flag(p);
-    }
-    out << "\" ;;\n";
-  }
-  for (const auto& c : program.commands) {
-    out << "    " << c->info().name << ") flags=\"$flags";
-    for (const FieldRef& f : c->fields()) out << ' ' << f.flag();
-    out << "\" ;;\n";
-  }
-  out << "  esac\n  case \"$cur\" in\n    -*) COMPREPLY=($(compgen -W \"$flags\" -- \"$cur\")) ;;\n    *) COMPREPLY=($(compgen -f -- "
-         "\"$cur\")) ;;\n  esac\n}\ncomplete -o filenames -F _osteo osteo ./osteo\n";
-  return out.str();
 }
 
 std::map<std::string, std::string> reference_pages(const Program& program) {

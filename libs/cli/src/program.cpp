@@ -1,4 +1,6 @@
 #include <unistd.h>
+
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <iostream>
@@ -31,6 +33,12 @@ struct Parsed {
   std::set<std::string> given;
 };
 
+// Flags may be written with underscores, as other programs (3D Slicer) must: --spacing_mm is --spacing-mm.
+std::string dashed(std::string flag) {
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
 Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields, const std::vector<std::string>& file_flags,
              bool takes_settings) {
   Parsed parsed;
@@ -52,7 +60,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       continue;
     }
     const std::size_t equals = arg.find('=');
-    std::string name = short_out ? "--out" : arg.substr(0, equals);
+    const std::string written = arg.substr(0, equals);
+    const std::string name = short_out ? "--out" : dashed(written);
     std::optional<std::string> value;
     if (equals != std::string::npos && !short_out) value = arg.substr(equals + 1);
     const auto take_value = [&]() -> std::string {
@@ -67,7 +76,8 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       parsed.settings.emplace_back(text.substr(0, at), text.substr(at + 1));
       continue;
     }
-    if (const auto it = std::find(file_flags.begin(), file_flags.end(), name.size() > 2 ? name.substr(2) : ""); it != file_flags.end()) {
+    if (const auto it = std::find_if(file_flags.begin(), file_flags.end(), [&](const std::string& f) { return "--" + dashed(f) == name; });
+        it != file_flags.end()) {
       parsed.files[*it] = take_value();
       continue;
     }
@@ -93,7 +103,7 @@ Parsed parse(const std::vector<std::string>& args, std::vector<FieldRef> fields,
       }
     }
     const std::string near = nearest_name(name, known);
-    throw Error(ExitCode::usage, "there is no flag " + name, near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
+    throw Error(ExitCode::usage, "there is no flag " + written, near.empty() ? "--help shows the flags" : "did you mean " + near + "?");
   }
   return parsed;
 }
@@ -227,6 +237,8 @@ int dispatch(Program& program, std::vector<std::string> args, std::ostream& out,
   Common::Params common;
   Invocation invocation{program.registry, {}, {}, {}, {}, {}, out, err, [] {}};
   const auto ready = [&] {
+    if (common.json && common.progress == ProgressStyle::slicer)
+      throw Error(ExitCode::usage, "--json and --progress slicer both want standard output", "give one of them");
     printer = std::make_unique<ProgressPrinter>(common.progress, common.quiet, err, ::isatty(2) != 0);
     invocation.common = common;
     invocation.context.threads = common.threads;
@@ -289,13 +301,17 @@ int run_program(Program& program, int argc, char** argv, std::ostream& out, std:
   const std::vector<std::string> args{argv + 1, argv + argc};
   const bool json =
       std::find(args.begin(), std::find(args.begin(), args.end(), "--"), "--json") != std::find(args.begin(), args.end(), "--");
+  // Slicer reads progress from standard output, and takes whatever comes on standard error for an error.
+  const auto style = std::find(args.begin(), args.end(), "--progress");
+  const bool slicer = std::find(args.begin(), args.end(), "--progress=slicer") != args.end() ||
+                      (style != args.end() && style + 1 != args.end() && *(style + 1) == "slicer");
   const auto failed = [&](const Error& e) {
     if (printer) printer->clear();
     return fail(e, json, out, err);
   };
   try {
     static_cast<void>(simd());  // an unknown OSTEO_SIMD is told by every command
-    const int code = dispatch(program, args, out, err, printer);
+    const int code = dispatch(program, args, out, slicer ? out : err, printer);
     if (printer) printer->clear();
     out.flush();
     if (!out) throw Error(ExitCode::cannot_write, "standard output cannot be written");

@@ -1,4 +1,4 @@
-// Shows progress on standard error in the style asked for. Private to libs/cli.
+// Shows progress in the style asked for: on standard error, for Slicer on standard output. Private to libs/cli.
 #pragma once
 #include <chrono>
 #include <iosfwd>

@@ -57,12 +57,7 @@ Vec3 extrapolate(const ForcePlane& p, Vec3 position_mm, std::int64_t now_ns, dou
 
 SpaceMouseDevice::SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal,
                                    std::size_t hand)
-    : goal_(start),
-      tool_(start.tool),
-      rotation_(rotation),
-      pedal_(pedal),
-      pedal_bit_(osteo::pedal_bit(hand)),
-      link_(std::move(open), *this, 100) {}
+    : TunedHand(hand), goal_(start), tool_(start.tool), rotation_(rotation), pedal_(pedal), link_(std::move(open), *this, 100) {}
 
 void SpaceMouseDevice::report(HidPort&, std::span<const std::byte> report) {
   if (!decode_space_mouse(report, own_.state)) return;
@@ -79,14 +74,16 @@ DeviceSample SpaceMouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) no
   static_cast<void>(shared_.try_load(last_));
   constexpr double kFullMmPerS = 60, kFullRadPerS = 1.5;
   const bool lent = lent_;
-  const SpaceMouseState s = lent ? SpaceMouseState{} : last_.state;
+  const HandTuning& t = tuning();
+  const std::uint32_t switches = pedal_ != nullptr ? pedal_->pressed() : 0;
+  SpaceMouseState s = lent ? SpaceMouseState{} : last_.state;
+  if (t.clutch || (switches & t.clutch_switches) != 0) s.move = s.turn = {};
   const Vec3 move{shaped(s.move[0]), shaped(s.move[1]), shaped(s.move[2])}, turn{shaped(s.turn[0]), shaped(s.turn[1]), shaped(s.turn[2])};
-  goal_.position_mm += rotation_ * (move * (kFullMmPerS * dt_s));
+  goal_.position_mm += rotation_ * (move * (kFullMmPerS * t.scale * dt_s));
   if (const double rate = length(turn); rate > 0)
     goal_.axis = to_floats(normalized(turned(from_floats(goal_.axis), rotation_ * (turn / rate), rate * kFullRadPerS * dt_s)));
   goal_.tool = tool_;
-  const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
-  goal_.pedal = !lent && ((s.buttons & 1U) != 0 || (pressed & pedal_bit_) != 0) ? 255 : 0;
+  goal_.pedal = lent ? 0 : pedal_of(t, s.buttons, switches);
   DeviceSample sample = hand_.step(goal_, dt_s, force_n);
   sample.buttons = static_cast<std::uint8_t>(s.buttons);
   // The cap at rest sends nothing, so silence is not a sign of an unplugged device; gone() says that.
@@ -99,12 +96,12 @@ DeviceMotion SpaceMouseDevice::motion() const noexcept {
 
 WoodenHapticsDevice::WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool,
                                          const FootPedal* pedal, std::size_t hand)
-    : geometry_(geometry),
+    : TunedHand(hand),
+      geometry_(geometry),
       kinematics_(geometry),
       map_(map),
       tool_(static_cast<std::uint8_t>(tool)),
       pedal_(pedal),
-      pedal_bit_(osteo::pedal_bit(hand)),
       link_(std::move(open), *this, 2) {}
 
 DeviceTraits WoodenHapticsDevice::traits() const {
@@ -153,18 +150,22 @@ void WoodenHapticsDevice::gone() {
 
 DeviceSample WoodenHapticsDevice::read(std::uint64_t, double, Vec3) noexcept {
   static_cast<void>(pose_.try_load(last_pose_));
-  const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
+  const HandTuning& t = tuning();
+  const std::uint32_t switches = pedal_ != nullptr ? pedal_->pressed() : 0;
+  map_.rescale(t.scale);
+  const bool clutch = t.clutch || (switches & t.clutch_switches) != 0;
   DeviceSample s;
   s.age_ms = age_ms(last_pose_.time_ns);
   if (last_pose_.time_ns == 0) {
     silent_ = true;
     s.position_mm = to_floats(map_.last_mm());
   } else {
-    s.position_mm = to_floats(map_.update(last_pose_.position_mm, (pressed & 2U) != 0 || silent_ || lent_));
+    s.position_mm = to_floats(map_.update(last_pose_.position_mm, clutch || silent_ || lent_));
     silent_ = false;
   }
   s.axis = to_floats(normalized(map_.direction(last_pose_.axis)));
-  s.pedal = !lent_ && (last_pose_.button || (pressed & pedal_bit_) != 0) ? 255 : 0;
+  s.pedal = lent_ ? 0 : pedal_of(t, last_pose_.button ? 1 : 0, switches);
+  s.buttons = last_pose_.button ? 1 : 0;
   s.tool = tool_;
   return s;
 }

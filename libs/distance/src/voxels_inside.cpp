@@ -63,7 +63,7 @@ void scan_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int weight, cons
   const int k0 = lowest < 0 ? 0 : static_cast<int>(lowest) + 1;
   const int k1 = highest >= dims[2] - 1 ? dims[2] - 1 : static_cast<int>(highest);
   for (int k = k0; k <= k1; ++k) {
-    const Cut s = cut(a, b, c, k);
+    const LevelCut s = cut(a, b, c, k);
     // Seen along x, an edge that goes up on the far side of y is counter-clockwise: the surface faces +x and the ray leaves.
     const bool leaves = s.y[0] > s.y[1];
     const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];

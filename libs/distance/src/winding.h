@@ -28,12 +28,12 @@ namespace osteo {
 /// Where the plane z = `level` cuts a triangle: at (y[0], x[0]) the edge that goes up in z, at [1] the one that goes down.
 /// Which edges are cut, and where, is a property of the edge alone, so that triangles that share it never leave a gap nor
 /// overlap, whatever the rounding.
-struct Cut {
+struct LevelCut {
   double y[2] = {0, 0}, x[2] = {0, 0};
   bool any = false;
 };
-[[nodiscard]] inline Cut cut(const Vec3& a, const Vec3& b, const Vec3& c, double level) {
-  Cut result;
+[[nodiscard]] inline LevelCut cut(const Vec3& a, const Vec3& b, const Vec3& c, double level) {
+  LevelCut result;
   const Vec3* corner[3] = {&a, &b, &c};
   for (int e = 0; e < 3; ++e) {
     const Vec3 *p = corner[e], *q = corner[e == 2 ? 0 : e + 1];
@@ -51,7 +51,7 @@ struct Cut {
 
 /// +1 or -1 when the ray that comes along x to p enters or leaves through the triangle, else 0.
 [[nodiscard]] inline int crossing_before(const Vec3& a, const Vec3& b, const Vec3& c, Vec3 p) {
-  const Cut s = cut(a, b, c, p.z);
+  const LevelCut s = cut(a, b, c, p.z);
   if (!s.any) return 0;
   const bool leaves = s.y[0] > s.y[1];
   const double y0 = leaves ? s.y[1] : s.y[0], y1 = leaves ? s.y[0] : s.y[1];

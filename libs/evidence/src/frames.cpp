@@ -5,6 +5,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/json_document.h"
+#include "osteo/session/apply.h"
 #include "osteo/session/recorder.h"
 
 namespace osteo {
@@ -70,85 +71,59 @@ void FrameMaker::begin_frame_at(std::uint64_t tick) {
   }
 }
 
-void FrameMaker::act(const SceneAction& action) {
-  if (!row_of(action).by_servo) {
-    std::vector<std::shared_ptr<Body>> before;
-    const bool saw = action.is(ActionKind::saw);
-    if (saw) {
-      for (const PlacedBody& b : world_.bodies()) before.push_back(b.body);
-    }
-    const World::Effect effect = world_.act(action);
-    if (saw) {
-      for (const World::Effect::Changed& c : effect.changed) {
-        const PlacedBody* const now = world_.find(c.body);
-        const auto old = std::find_if(before.begin(), before.end(), [&](const auto& b) { return b->id == c.body; });
-        if (now == nullptr || old == before.end()) continue;
-        for (const std::uint32_t brick : c.bricks) {
-          for (std::uint32_t o = 0; o < BrickGrid::kVoxels; ++o) {
-            const VoxelKey own = brick * BrickGrid::kVoxels + o;
-            const float was = (*old)->bone.value(own), is = now->body->bone.value(own);
-            if (is < was) sawn_.push_back({now->body->name_of(own), is, was});
-          }
-        }
+void FrameMaker::action(const SceneAction& action) {
+  // Of several frames of a file within a tenth of a second the ticks belong together only up to here.
+  if (parts_changes(row_of(action)) && !changes_.empty()) flush();
+  actions_.push_back(action);
+  std::vector<std::shared_ptr<Body>> before;
+  if (action.is(ActionKind::saw)) {
+    for (const PlacedBody& b : world_.bodies()) before.push_back(b.body);
+  }
+  const World::Effect effect = apply_action(action, world_);
+  if (!action.is(ActionKind::saw)) return;
+  for (const World::Effect::Changed& c : effect.changed) {
+    const PlacedBody* const now = world_.find(c.body);
+    const auto old = std::find_if(before.begin(), before.end(), [&](const auto& b) { return b->id == c.body; });
+    if (now == nullptr || old == before.end()) continue;
+    for (const std::uint32_t brick : c.bricks) {
+      for (std::uint32_t o = 0; o < BrickGrid::kVoxels; ++o) {
+        const VoxelKey own = brick * BrickGrid::kVoxels + o;
+        const float was = (*old)->bone.value(own), is = now->body->bone.value(own);
+        if (is < was) sawn_.push_back({now->body->name_of(own), is, was});
       }
     }
   }
-  world_.tell(action);
 }
 
-void FrameMaker::action(const SceneAction& action) {
-  if (parts_changes(row_of(action)) && !changes_.empty()) flush();
-  actions_.push_back(action);
-  act(action);
-}
-
-void FrameMaker::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
+void FrameMaker::take(const TickRecord& record) {
   if (record.tick + 1 != next_tick_) begin_frame_at(record.tick);
   next_tick_ = record.tick + 1;
   ticks_.push_back(record);
-  for (const VoxelChange& c : changes) {
-    const PlacedBody* const b = world_.owner(c.voxel);
-    if (b == nullptr) continue;
-    BrickGrid& bone = b->body->bone;
-    const VoxelKey own = c.voxel - b->body->name_of(0);
-    const float was = bone.value(own);
-    if (const auto [at, is_new] = in_frame_.try_emplace(c.voxel, changes_.size()); is_new) {
-      changes_.push_back({c.voxel, c.density, was});
-    } else {
-      changes_[at->second].density = c.density;
-    }
-    bone.set(own, c.density);
-    const VoxelChange told{c.voxel, c.density, was};
-    world_.tell({&told, 1});
+}
+
+bool FrameMaker::take(const VoxelChange& change) {
+  const std::optional<VoxelChange> told = apply_change(change, world_);
+  if (!told) return false;
+  if (const auto [at, is_new] = in_frame_.try_emplace(told->voxel, changes_.size()); is_new) {
+    changes_.push_back(*told);
+  } else {
+    changes_[at->second].density = told->density;
   }
+  return true;
+}
+
+void FrameMaker::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
+  take(record);
+  // What belongs to a body that was just exchanged comes no more.
+  for (const VoxelChange& c : changes) static_cast<void>(take(c));
 }
 
 void FrameMaker::part(const SessionPart& part) {
   if (part.gap != nullptr) flush();
-  for (const SceneAction& a : part.actions) {
-    // Frames of a file begin at each; of several within a tenth of a second the ticks belong together only up to here.
-    if (parts_changes(row_of(a)) && !changes_.empty()) flush();
-    actions_.push_back(a);
-    act(a);
-  }
-  for (const TickRecord& t : part.ticks) {
-    if (t.tick + 1 != next_tick_) begin_frame_at(t.tick);
-    next_tick_ = t.tick + 1;
-    ticks_.push_back(t);
-  }
+  for (const SceneAction& a : part.actions) action(a);
+  for (const TickRecord& t : part.ticks) take(t);
   for (const VoxelChange& c : part.changes) {
-    const PlacedBody* const b = world_.owner(c.voxel);
-    if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-    BrickGrid& bone = b->body->bone;
-    const VoxelKey own = c.voxel - b->body->name_of(0);
-    const VoxelChange change{c.voxel, c.density, bone.value(own)};
-    bone.set(own, c.density);
-    world_.tell({&change, 1});
-    if (const auto [at, is_new] = in_frame_.try_emplace(c.voxel, changes_.size()); is_new) {
-      changes_.push_back(change);
-    } else {
-      changes_[at->second].density = c.density;
-    }
+    if (!take(c)) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
   }
 }
 

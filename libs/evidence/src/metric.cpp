@@ -9,7 +9,8 @@ namespace {
 
 constexpr Better kUp = Better::higher, kDown = Better::lower, kNone = Better::neither;
 constexpr std::string_view kThesis351 = "Morris 2006, 3.5.1", kThesis352 = "Morris 2006, 3.5.2", kThesis353 = "Morris 2006, 3.5.3",
-                           kProcess = "after Wan 2010, UWO thesis", kOurs = "this project", kStroke = "after FIVRS, mended";
+                           kProcess = "after Wan 2010, UWO thesis", kOurs = "this project", kStroke = "after FIVRS, mended",
+                           kSmooth = "Balasubramanian 2015", kHeat = "docs/heat.md";
 
 // The one declaration of each.
 constexpr MetricRow kTable[] = {
@@ -37,7 +38,11 @@ constexpr MetricRow kTable[] = {
     {"stroke_mm", "mm", kNone, "", kStroke, "length of a stroke, the middle"},
     {"stroke_s", "s", kNone, "", kStroke, "time of a stroke, the middle"},
     {"stroke_variance", "1", kDown, "", kStroke, "how little five strokes in a row follow one line: 0 one line, 2/3 all directions"},
+    {"stroke_sparc", "1", kUp, "", kSmooth,
+     "spectral arc length of a stroke's speed, the middle of those of 100 ms; nearer to 0 is smoother"},
+    {"stroke_ldlj", "1", kUp, "", kSmooth, "log dimensionless jerk of the same; nearer to 0 is smoother"},
     {"phase_s", "s", kNone, "", kStroke, "time for each fifth of the volume"},
+    {"step_s", "s", kNone, "structures, procedure", kOurs, "time for each step of the procedure, by where the burr drills"},
     {"seen_share", "1", kUp, "camera", kThesis351, "of removed bone, by volume, seen when it went"},
     {"hidden_mm3", "mm3", kDown, "camera", kThesis351, "removed unseen"},
     {"sight_unknown_mm3", "mm3", kNone, "camera", kThesis351, "removed before the first camera note"},
@@ -48,6 +53,12 @@ constexpr MetricRow kTable[] = {
     {"injured_s", "s", kDown, "structures", kProcess, "how long while it turned"},
     {"near_s", "s", kNone, "structures", kProcess, "drilling within 2 mm of it"},
     {"near_mm3", "mm3", kNone, "structures", kProcess, "bone taken with the burr within 2 mm of it"},
+    {"near_05_s", "s", kNone, "structures", kProcess, "drilling within 0.5 mm of it"},
+    {"near_05_mm3", "mm3", kNone, "structures", kProcess, "bone taken with the burr within 0.5 mm of it"},
+    {"near_1_s", "s", kNone, "structures", kProcess, "drilling within 1 mm of it"},
+    {"near_1_mm3", "mm3", kNone, "structures", kProcess, "bone taken with the burr within 1 mm of it"},
+    {"near_4_s", "s", kNone, "structures", kProcess, "drilling within 4 mm of it"},
+    {"near_4_mm3", "mm3", kNone, "structures", kProcess, "bone taken with the burr within 4 mm of it"},
     {"excess_force_ns", "N s", kDown, "structures, procedure", kProcess, "impulse above the procedure's limit near it"},
     {"burr_choice_share", "1", kUp, "structures, procedure", kProcess, "of drilling where a rule on burrs holds, with an allowed one"},
     {"target_share", "1", kUp, "structures, procedure", kOurs, "of a target region's bone, gone"},
@@ -55,6 +66,9 @@ constexpr MetricRow kTable[] = {
     {"outside_target_mm3", "mm3", kDown, "structures, procedure", kProcess, "removed bone that lies in no target region"},
     {"cavity_mm3", "mm3", kNone, "structures, procedure", kOurs, "that a ball of 0.5 mm reaches now and did not before"},
     {"items_passed", "1", kUp, "structures, procedure", kOurs, "of the scale"},
+    {"heat_bone_c", "C", kDown, "heat", kHeat, "the warmest that bone became; known within a factor of ten at best"},
+    {"heat_peak_c", "C", kDown, "heat, structures", kHeat, "the warmest that the structure's face became"},
+    {"heat_cem43_min", "min", kDown, "heat, structures", kHeat, "dose at its face, in minutes at 43 C; 16 harm bone"},
     {"force_above_band_share", "1", kDown, "structures, reference", kThesis352,
      "of drilling near it, pressing harder than 90 % of experts do at that distance"},
     {"speed_above_band_share", "1", kDown, "structures, reference", kThesis352,

@@ -6,11 +6,16 @@
 
 #include "osteo/bone/instrument.h"
 #include "osteo/evidence/visibility.h"
+#include "osteo/statistics/basics.h"
 
 namespace osteo {
 namespace {
 
 constexpr double kStillMmPerS = 2, kIdleAfterS = 1;
+// Of NearMetric::kBandsMm.
+constexpr const char* kNearS[] = {"near_05_s", "near_1_s", "near_s", "near_4_s"};
+constexpr const char* kNearMm3[] = {"near_05_mm3", "near_1_mm3", "near_mm3", "near_4_mm3"};
+static_assert(std::size(kNearS) == NearMetric::kBandsMm.size() && NearMetric::kBandsMm[2] == kNearMm);
 
 bool drills(const TickRecord& t, const Instrument& tool) {
   return tool.as_burr() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
@@ -23,11 +28,6 @@ double quantile(const std::vector<float>& sorted, double q) {
   const auto n = static_cast<double>(sorted.size());
   const auto at = static_cast<std::size_t>(std::clamp(std::ceil(q * n) - 1, 0.0, n - 1));
   return static_cast<double>(sorted[at]);
-}
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  const std::size_t n = v.size();
-  return n % 2 == 1 ? v[n / 2] : (v[n / 2 - 1] + v[n / 2]) / 2;
 }
 
 }  // namespace
@@ -134,8 +134,9 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
     for (const char* const name : {"camera_moves", "camera_s"}) values.push_back(not_measured(name, "the session has no camera notes"));
   }
   if (drilling_ == 0) {
-    for (const char* const name : {"rate_mm3_per_s", "force_median_n", "force_p95_n", "force_peak_n", "suction_share", "irrigation_share",
-                                   "burr_side_share", "strokes", "strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance", "phase_s"})
+    for (const char* const name :
+         {"rate_mm3_per_s", "force_median_n", "force_p95_n", "force_peak_n", "suction_share", "irrigation_share", "burr_side_share",
+          "strokes", "strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance", "stroke_sparc", "stroke_ldlj", "phase_s"})
       values.push_back(not_measured(name, "no burr drilled"));
     return;
   }
@@ -152,18 +153,26 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
   const std::vector<Stroke>& strokes = strokes_.finish();
   values.push_back(measured("strokes", static_cast<double>(strokes.size())));
   if (strokes.empty()) {
-    for (const char* const name : {"strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance"})
+    for (const char* const name : {"strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance", "stroke_sparc", "stroke_ldlj"})
       values.push_back(not_measured(name, "no stroke of 1 mm and 80 ms"));
   } else {
-    std::vector<double> mm, s;
+    std::vector<double> mm, s, sparc, jerk;
     for (const Stroke& k : strokes) {
       mm.push_back(k.length_mm);
       s.push_back(k.end_s - k.begin_s);
+      if (!std::isnan(k.sparc)) sparc.push_back(k.sparc);
+      if (!std::isnan(k.log_dimensionless_jerk)) jerk.push_back(k.log_dimensionless_jerk);
     }
+    const auto median = [](const std::vector<double>& v) { return statistics::quantile(v, 0.5); };
     values.push_back(measured("strokes_per_s", static_cast<double>(strokes.size()) / drilling_s));
     values.push_back(measured("stroke_mm", median(mm)));
     values.push_back(measured("stroke_s", median(s)));
     values.push_back(measured("stroke_variance", stroke_variance(strokes)));
+    const auto smooth = [&](const char* name, const std::vector<double>& v) {
+      values.push_back(v.empty() ? not_measured(name, "no stroke of 100 ms") : measured(name, median(v)));
+    };
+    smooth("stroke_sparc", sparc);
+    smooth("stroke_ldlj", jerk);
   }
   if (removed_mm3_ <= 0) {
     values.push_back(not_measured("phase_s", "nothing was removed"));
@@ -183,7 +192,9 @@ NearMetric::NearMetric(const EvidenceScene& scene) : scene_(scene) {
   if (scene_.structures == nullptr) return;
   of_.resize(scene_.structures->values().size());
   each_.resize(of_.size());
-  if (scene_.procedure != nullptr) last_excess_.assign(scene_.procedure->force_limits.size(), 0);
+  if (scene_.procedure == nullptr) return;
+  last_excess_.assign(scene_.procedure->force_limits.size(), 0);
+  steps_.emplace(*scene_.structures, *scene_.procedure, scene_.rate_hz);
 }
 
 void NearMetric::frame(const EvidenceFrame& f) {
@@ -194,6 +205,7 @@ void NearMetric::frame(const EvidenceFrame& f) {
   const std::vector<std::uint8_t>& names = scene_.structures->values();
   for (const TickRecord& t : f.ticks) {
     const std::uint64_t n = ticks_++;
+    if (t.hand == 0) ++known_;
     const std::size_t hand = std::min<std::size_t>(t.hand, kMostHands - 1);
     const Vec3 device_at = from_floats(t.device.position_mm);
     const std::optional<Vec3> last_at = std::exchange(last_at_[hand], device_at);
@@ -205,6 +217,7 @@ void NearMetric::frame(const EvidenceFrame& f) {
     scene_.structures->clearance(tool.head, at, own.rotation * normalized(from_floats(t.device.axis)), each_);
     const bool works = drills(t, tool), removes = t.removed_mm3 > 0;
     const double t_s = seconds(t.tick, f.rate_hz), force = static_cast<double>(t.normal_force_n);
+    if (works && t.hand == 0 && steps_) steps_->drill(known_ - 1, each_);
     for (std::size_t s = 0; s < of_.size(); ++s) {
       Of& o = of_[s];
       const double d = each_[s];
@@ -223,8 +236,11 @@ void NearMetric::frame(const EvidenceFrame& f) {
         if (!o.injured_before) moments_.push_back({t_s, at, "reached by a turning burr", scene_.structures->name_of(names[s]), d, 0});
       }
       o.injured_before = injures;
-      if (works && d < kNearMm) ++o.near;
-      if (removes && d < kNearMm) o.near_mm3 += static_cast<double>(t.removed_mm3);
+      for (std::size_t b = 0; b < kBandsMm.size(); ++b) {
+        if (d >= kBandsMm[b]) continue;
+        if (works) ++o.near[b];
+        if (removes) o.near_mm3[b] += static_cast<double>(t.removed_mm3);
+      }
       if (works && d < scene_.structures->reach_mm() && t.tick % every == 0) {
         const double speed = last_at ? length(device_at - *last_at) * f.rate_hz : 0;
         samples_[names[s]].push_back({t_s, at, static_cast<float>(d), t.normal_force_n, static_cast<float>(speed)});
@@ -259,7 +275,8 @@ void NearMetric::frame(const EvidenceFrame& f) {
 
 void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, std::vector<Moment>& moments) {
   if (scene_.structures == nullptr) {
-    for (const char* const name : {"clearance_mm", "touches", "touched_s", "injured_s", "near_s", "near_mm3"})
+    for (const char* const name : {"clearance_mm", "touches", "touched_s", "injured_s", "near_s", "near_mm3", "near_05_s", "near_05_mm3",
+                                   "near_1_s", "near_1_mm3", "near_4_s", "near_4_mm3"})
       values.push_back(not_measured(name, "the case has no structures"));
     return;
   }
@@ -277,14 +294,17 @@ void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, s
     values.push_back(measured("touches", static_cast<double>(o.touches), name));
     values.push_back(measured("touched_s", seconds(o.touched, scene_.rate_hz), name));
     values.push_back(measured("injured_s", seconds(o.injured, scene_.rate_hz), name));
-    values.push_back(measured("near_s", seconds(o.near, scene_.rate_hz), name));
-    values.push_back(measured("near_mm3", o.near_mm3, name));
+    for (std::size_t b = 0; b < kBandsMm.size(); ++b) {
+      values.push_back(measured(kNearS[b], seconds(o.near[b], scene_.rate_hz), name));
+      values.push_back(measured(kNearMm3[b], o.near_mm3[b], name));
+    }
     if (o.touched_first) moments.push_back({0, {}, "touched from the first tick on", name, 0, 0});
     for (const Moment& m : moments_) {
       if (m.structure == name) moments.push_back(m);
     }
   }
   if (scene_.procedure == nullptr) return;
+  steps_->finish(values);
   for (const ForceLimit& l : scene_.procedure->force_limits) {
     for (std::size_t s = 0; s < of_.size(); ++s) {
       if (scene_.structures->name_of(scene_.structures->values()[s]) == l.structure)

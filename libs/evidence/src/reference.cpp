@@ -6,6 +6,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/statistics/isotonic.h"
 
 namespace osteo {
 
@@ -60,42 +61,15 @@ RegionScore score_region(const RemovedSet& session, std::span<const RemovedSet> 
   return score;
 }
 
-namespace {
-
-double quantile(const std::vector<double>& sorted, double q) {
-  const auto n = static_cast<double>(sorted.size());
-  return sorted[static_cast<std::size_t>(std::clamp(std::ceil(q * n - 1e-12) - 1, 0.0, n - 1))];
-}
-
-}  // namespace
-
 IsotonicQuantile::IsotonicQuantile(std::span<const Point> points, double q) {
-  std::map<long, std::vector<double>> by_step;
-  for (const Point& p : points) by_step[std::lround(std::floor(p.distance_mm / kStepMm))].push_back(p.value);
-  struct Block {
-    std::vector<long> steps;
-    std::vector<double> sorted;
-    double value = 0;
-  };
-  std::vector<Block> blocks;
-  for (auto& [step, values] : by_step) {
-    std::sort(values.begin(), values.end());
-    Block b{{step}, std::move(values), 0};
-    b.value = quantile(b.sorted, q);
-    while (!blocks.empty() && blocks.back().value >= b.value) {
-      Block& before = blocks.back();
-      std::vector<double> together;
-      together.reserve(before.sorted.size() + b.sorted.size());
-      std::merge(before.sorted.begin(), before.sorted.end(), b.sorted.begin(), b.sorted.end(), std::back_inserter(together));
-      before.steps.insert(before.steps.end(), b.steps.begin(), b.steps.end());
-      b = {std::move(before.steps), std::move(together), 0};
-      b.value = quantile(b.sorted, q);
-      blocks.pop_back();
-    }
-    blocks.push_back(std::move(b));
+  if (points.empty()) return;
+  std::vector<double> step_mm, values;
+  for (const Point& p : points) {
+    step_mm.push_back(std::floor(p.distance_mm / kStepMm) * kStepMm);
+    values.push_back(p.value);
   }
-  for (const Block& b : blocks)
-    for (const long s : b.steps) steps_.push_back({static_cast<double>(s) * kStepMm, b.value});
+  const statistics::MonotoneCurve curve = statistics::isotonic_quantile(step_mm, values, q);
+  for (std::size_t n = 0; n < curve.x.size(); ++n) steps_.push_back({curve.x[n], curve.y[n]});
 }
 
 double IsotonicQuantile::at(double distance_mm) const {

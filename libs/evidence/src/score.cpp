@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "osteo/base/error.h"
+#include "osteo/base/parallel.h"
 #include "osteo/bone/instrument.h"
 #include "osteo/grid/brick_places.h"
 
@@ -63,6 +64,16 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+bool no_bone(const World& world) {
+  for (const PlacedBody& b : world.bodies()) {
+    const BrickGrid& bone = b.body->bone;
+    for (VoxelKey v = 0; v < bone.brick_count() * BrickGrid::kVoxels; ++v) {
+      if (bone.value(v) >= kSolid) return false;
+    }
+  }
+  return true;
+}
+
 bool has(const StructureMap* structures, const std::string& name) {
   if (structures == nullptr) return false;
   const auto& values = structures->values();
@@ -94,10 +105,9 @@ void check_procedure(const Procedure& p, const StructureMap* structures, std::ve
 }
 
 void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, const Reference* reference, const std::string& subject,
-                  double rate_hz, Score& score) {
+                  Score& score) {
   static constexpr const char* kRegion[] = {"region_log_ratio", "region_per_voxel", "region_voxels", "region_thesis"};
   static constexpr const char* kBand[] = {"force_above_band_share", "speed_above_band_share"};
-  static_cast<void>(rate_hz);
   if (reference == nullptr) return;
   const RemovedSet mine = keeper.removed_set();
   std::vector<RemovedSet> experts, novices;
@@ -187,7 +197,11 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
   }
   const Product product(begin, end, *structures, procedure, std::move(removed), context);
   if (!product.word().empty()) score.words.push_back(product.word());
-  for (const ScaleItem& item : procedure.items) score.items.push_back(product.evaluate(item, keeper.approach(), injured));
+  score.items.resize(procedure.items.size());
+  const Vec3 approach = keeper.approach();
+  parallel_for(procedure.items.size(), 1, context.threads, [&](std::size_t from, std::size_t to) {
+    for (std::size_t n = from; n < to; ++n) score.items[n] = product.evaluate(procedure.items[n], approach, injured);
+  });
   for (const Product::RegionResult& r : product.regions()) {
     if (r.region->kind == RegionKind::forbidden) {
       score.values.push_back(measured("forbidden_mm3", r.removed_mm3, r.region->name));
@@ -205,7 +219,7 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
 }  // namespace
 
 Score score_session(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
-                    const Reference* reference, const std::string& subject, const Context& context) {
+                    const Reference* reference, const std::string& subject, const Context& context, ScoreDetail* detail) {
   Score score;
   if (procedure != nullptr) {
     score.procedure = procedure->name;
@@ -218,15 +232,30 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
   double t = now_s();
   ScoreKeeper keeper({session.header().rate_hz, structures, procedure});
   const World first = begin.copy();
-  const World end = tell_frames(
-      session, std::move(begin), [&](const EvidenceFrame& f) { keeper.frame(f); }, context.sub(0, 0.8));
+  std::ptrdiff_t undone = 0;
+  World end = tell_frames(
+      session, std::move(begin),
+      [&](const EvidenceFrame& f) {
+        keeper.frame(f);
+        undone += std::count_if(f.actions.begin(), f.actions.end(), [](const SceneAction& a) { return a.is(ActionKind::undo); });
+        if (detail != nullptr && detail->frame) detail->frame(f);
+      },
+      context.sub(0, 0.8));
   keeper.finish(end);
   score.seconds_frames = now_s() - t;
   score.values = keeper.values();
   score.moments = keeper.moments();
   if (keeper.removed().empty()) score.words.push_back("nothing was removed");
-  if (first.bodies().size() > 1 || end.bodies().size() > 1)
+  if (undone > 0)
+    score.words.push_back((undone == 1 ? "a step was taken back" : std::to_string(undone) + " steps were taken back") +
+                          std::string(": what was seen and the end product go by what is gone at the end; all else counts the work done"));
+  const auto count = [](const World& w, bool of_region) {
+    return std::count_if(w.bodies().begin(), w.bodies().end(), [&](const PlacedBody& b) { return b.of_region == of_region; });
+  };
+  if (count(first, false) > 1 || count(end, false) > 1)
     score.words.push_back("bone in pieces: the end product is measured with each where it lay at the beginning");
+  if (count(first, true) > 0) score.words.push_back("the case has a finer region: volumes and what was seen go by each voxel's own size");
+  if (!keeper.removed().empty() && no_bone(end)) score.words.push_back("no bone is left");
   if (structures == nullptr && procedure == nullptr) score.words.push_back("the case has no structures: nothing is known of what was near");
   for (const Moment& m : score.moments) {
     if (m.what == "touched from the first tick on")
@@ -251,10 +280,17 @@ Score score_session(const SessionReader& session, World begin, const StructureMa
     }
   }
   score.seconds_product = now_s() - t;
-  by_reference(keeper, structures, reference, subject, session.header().rate_hz, score);
+  by_reference(keeper, structures, reference, subject, score);
   std::stable_sort(score.moments.begin(), score.moments.end(), [](const Moment& a, const Moment& b) { return a.t_s < b.t_s; });
   for (const auto& v : keeper.visibility().voxels()) {
     if (v.second.seen == VisibilityMetric::Seen::hidden) score.hidden.emplace_back(v.first, v.second);
+  }
+  if (detail != nullptr) {
+    detail->voxels = keeper.visibility().voxels();
+    detail->removed = keeper.removed_set();
+    detail->near = keeper.near().samples();
+    detail->approach = keeper.approach();
+    detail->end = std::move(end);
   }
   context.progress(1);
   return score;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "osteo/statistics/movement.h"
+
 namespace osteo {
 
 void StrokeFinder::add(double t_s, Vec3 at_mm) {
@@ -23,12 +25,23 @@ void StrokeFinder::end_period() {
   const std::size_t n = period_.size();
   // Turn at each sample, in degrees.
   std::vector<double> turn(n, 0.0);
+  const auto before = [&](std::size_t i) { return period_[i].at_mm - period_[i - kReach].at_mm; };
+  const auto behind = [&](std::size_t i) { return period_[i + kReach].at_mm - period_[i].at_mm; };
+  const auto degrees = [](Vec3 in, Vec3 out) {
+    return std::acos(std::clamp(dot(in, out) / (length(in) * length(out)), -1.0, 1.0)) * 180 / std::numbers::pi;
+  };
+  const auto still = [&](std::size_t i) { return length(before(i)) < kStillMm || length(behind(i)) < kStillMm; };
   for (std::size_t i = kReach; i + kReach < n; ++i) {
-    const Vec3 in = period_[i].at_mm - period_[i - kReach].at_mm, out = period_[i + kReach].at_mm - period_[i].at_mm;
-    const double a = length(in), b = length(out);
-    if (a < kStillMm || b < kStillMm) continue;
-    turn[i] = std::acos(std::clamp(dot(in, out) / (a * b), -1.0, 1.0)) * 180 / std::numbers::pi;
+    if (!still(i)) {
+      turn[i] = degrees(before(i), behind(i));
+      continue;
+    }
+    // Who slows down, rests and goes back turns too: in the middle of the rest, from the way before it to the way behind.
+    const std::size_t from = i;
+    while (i + 1 + kReach < n && still(i + 1)) ++i;
+    if (from > kReach && i + 1 + kReach < n) turn[(from + i) / 2] = degrees(before(from - 1), behind(i + 1));
   }
+  const std::size_t first = strokes_.size();
   std::size_t begin = 0;
   const auto put = [&](std::size_t end) {
     Stroke s{period_[begin].t_s, period_[end].t_s, 0, {}};
@@ -50,7 +63,35 @@ void StrokeFinder::end_period() {
     if (std::max_element(from, to) == turn.begin() + static_cast<std::ptrdiff_t>(i)) put(i);  // of equals the first
   }
   if (n > 1) put(n - 1);
+  measure(first);
   period_.clear();
+}
+
+void StrokeFinder::measure(std::size_t first) {
+  // A filter of second order that goes both ways needs ten samples.
+  if (first == strokes_.size() || period_.size() < 10) return;
+  std::vector<double> times_s;
+  for (const Sample& s : period_) times_s.push_back(s.t_s);
+  std::vector<std::array<double, 3>> places;
+  for (std::size_t a = 0; a < 3; ++a) {
+    std::vector<double> values;
+    for (const Sample& s : period_) values.push_back(s.at_mm[a]);
+    // Where the burr left the bone for less than a pause, straight on.
+    const std::vector<double> even = statistics::low_pass(statistics::resample(times_s, values, kRateHz), kRateHz, kSmoothHz);
+    places.resize(even.size());
+    for (std::size_t i = 0; i < even.size(); ++i) places[i][a] = even[i];
+  }
+  const std::vector<double> speed = statistics::speed_of(places, kRateHz);
+  for (std::size_t s = first; s < strokes_.size(); ++s) {
+    Stroke& k = strokes_[s];
+    if (k.end_s - k.begin_s < kSmoothLeastS - 1e-9) continue;
+    const auto step = [&](double t_s) {
+      return std::min(speed.size(), static_cast<std::size_t>(std::llround((t_s - times_s[0]) * kRateHz)));
+    };
+    const std::span<const double> its(speed.data() + step(k.begin_s), step(k.end_s) - step(k.begin_s));
+    k.sparc = statistics::sparc(its, kRateHz);
+    k.log_dimensionless_jerk = statistics::log_dimensionless_jerk(its, kRateHz);
+  }
 }
 
 const std::vector<Stroke>& StrokeFinder::finish() {

@@ -1,7 +1,9 @@
 #include "osteo/grid/brick_grid.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
+#include <new>
 #include <tuple>
 
 #include "osteo/base/error.h"
@@ -9,6 +11,29 @@
 #include "osteo/base/parallel.h"
 
 namespace osteo {
+namespace {
+
+// Large ones are the system's own zeros, which take no memory until they are written.
+std::shared_ptr<float[]> zeros(std::size_t bricks) {
+  const std::size_t n = std::max<std::size_t>(bricks, 1) * BrickGrid::kVoxels;
+  auto* const values = static_cast<float*>(std::calloc(n, sizeof(float)));
+  if (values == nullptr) throw std::bad_alloc();
+  return {values, [](float* p) { std::free(p); }};
+}
+
+std::vector<std::shared_ptr<float>> in_a_block(const std::shared_ptr<float[]>& block, std::size_t count) {
+  std::vector<std::shared_ptr<float>> bricks;
+  bricks.reserve(count);
+  for (std::size_t b = 0; b < count; ++b) bricks.emplace_back(block, block.get() + b * BrickGrid::kVoxels);
+  return bricks;
+}
+
+// Of a brick that another thread may write.
+void copy_brick(float* from, float* to) {
+  for (int v = 0; v < BrickGrid::kVoxels; ++v) to[v] = std::atomic_ref<float>(from[v]).load(std::memory_order_relaxed);
+}
+
+}  // namespace
 
 BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), origins_(std::move(bricks)) {
   std::sort(origins_.begin(), origins_.end(), [](Ijk a, Ijk b) { return std::tie(a.k, a.j, a.i) < std::tie(b.k, b.j, b.i); });
@@ -35,7 +60,7 @@ BrickGrid::BrickGrid(Frame frame, std::vector<Ijk> bricks) : frame_(frame), orig
     const Ijk b = origins_[n];
     table_[(static_cast<std::size_t>(b.k) * extent_[1] + static_cast<std::size_t>(b.j)) * extent_[0] + static_cast<std::size_t>(b.i)] = n;
   }
-  values_ = std::make_unique<float[]>(origins_.size() * kVoxels);
+  bricks_ = in_a_block(zeros(origins_.size()), origins_.size());
 }
 
 BrickGrid::BrickGrid(const BrickGrid& other)
@@ -43,10 +68,31 @@ BrickGrid::BrickGrid(const BrickGrid& other)
       extent_(other.extent_),
       table_(other.table_),
       origins_(other.origins_),
-      values_(std::make_unique_for_overwrite<float[]>(other.origins_.size() * kVoxels)) {
+      bricks_(in_a_block(std::make_shared_for_overwrite<float[]>(other.origins_.size() * kVoxels), other.origins_.size())) {
   parallel_for(origins_.size(), 2048, 0, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin * kVoxels; v < end * kVoxels; ++v) values_[v] = other.value(static_cast<VoxelKey>(v));
+    for (std::size_t b = begin; b < end; ++b) copy_brick(other.bricks_[b].get(), bricks_[b].get());
   });
+}
+
+BrickGrid BrickGrid::sharing() const {
+  BrickGrid g;
+  g.frame_ = frame_;
+  g.extent_ = extent_;
+  g.table_ = table_;
+  g.origins_ = origins_;
+  g.bricks_ = bricks_;
+  return g;
+}
+
+void BrickGrid::own_brick(std::uint32_t brick) {
+  const auto own = std::make_shared_for_overwrite<float[]>(kVoxels);
+  copy_brick(bricks_[brick].get(), own.get());
+  bricks_[brick] = std::shared_ptr<float>(own, own.get());
+}
+
+void BrickGrid::empty_bricks(std::span<const std::uint32_t> bricks) {
+  const auto block = in_a_block(zeros(bricks.size()), bricks.size());
+  for (std::size_t b = 0; b < bricks.size(); ++b) bricks_[bricks[b]] = block[b];
 }
 
 void BrickGrid::read_block(Ijk lo, std::array<int, 3> n, float* out) const {
@@ -78,7 +124,7 @@ double BrickGrid::sum() const {
 }
 
 std::size_t BrickGrid::memory_bytes() const {
-  return origins_.size() * (kVoxels * sizeof(float) + sizeof(Ijk)) + table_.size() * sizeof(std::uint32_t);
+  return origins_.size() * (kVoxels * sizeof(float) + sizeof(Ijk) + sizeof(bricks_[0])) + table_.size() * sizeof(std::uint32_t);
 }
 
 std::string BrickGrid::hash() const {

@@ -10,6 +10,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/param.h"
 #include "osteo/grid/brick_grid.h"
 #include "osteo/grid/grid_io.h"
 
@@ -39,6 +40,11 @@ SparseGrid wrap(openvdb::FloatGrid::Ptr vdb, const Frame& frame, std::string nam
 namespace {
 
 openvdb::math::Transform::Ptr transform_of(const Frame& f) {
+  // OpenVDB takes a voxel of less than this volume for none at all.
+  const double volume_mm3 = f.spacing_mm[0] * f.spacing_mm[1] * f.spacing_mm[2];
+  if (!(volume_mm3 > 3 * openvdb::math::Tolerance<double>::value()))
+    throw Error(ExitCode::failed, "a .vdb file cannot hold voxels of " + format_number(f.spacing_mm[0]) + " mm",
+                "write .nrrd or .vti, or scale the body: coordinates are in mm");
   // OpenVDB's matrices take row vectors: row a is where index axis a goes.
   openvdb::math::Mat4d m = openvdb::math::Mat4d::identity();
   for (int a = 0; a < 3; ++a) {

@@ -15,6 +15,32 @@ namespace {
 
 using F4 = float __attribute__((vector_size(16)));
 
+// The same of the cubic B-spline.
+void spline_weights(float t, float w[4], float d[4]) {
+  const float s = 1 - t, t2 = t * t, s2 = s * s;
+  w[0] = s2 * s / 6;
+  w[1] = (4 - 6 * t2 + 3 * t2 * t) / 6;
+  w[2] = (4 - 6 * s2 + 3 * s2 * s) / 6;
+  w[3] = t2 * t / 6;
+  d[0] = -0.5F * s2;
+  d[1] = -2 * t + 1.5F * t2;
+  d[2] = 2 * s - 1.5F * s2;
+  d[3] = 0.5F * t2;
+}
+
+// Values of a line to the coefficients of the spline through them, the line mirrored at its ends.
+void to_spline(std::vector<double>& line) {
+  const double pole = std::sqrt(3.0) - 2;
+  const std::size_t n = line.size();
+  double first = line[0], power = pole;
+  for (std::size_t i = 1; i < n && i < 40; ++i, power *= pole) first += power * line[i];
+  line[0] = first;
+  for (std::size_t i = 1; i < n; ++i) line[i] += pole * line[i - 1];
+  line[n - 1] = pole / (pole * pole - 1) * (line[n - 1] + pole * line[n - 2]);
+  for (std::size_t i = n - 1; i-- > 0;) line[i] = pole * (line[i + 1] - line[i]);
+  for (double& v : line) v *= 6;
+}
+
 // Weights of Catmull-Rom's cubic at t in [0, 1] for the four neighbours, and their slopes.
 void weights(float t, float w[4], float d[4]) {
   const float t2 = t * t, t3 = t2 * t;
@@ -30,8 +56,24 @@ void weights(float t, float w[4], float d[4]) {
 
 }  // namespace
 
-CubicField::CubicField(const Frame& frame, std::vector<float> values) : frame_(frame), values_(std::move(values)) {
+CubicField::CubicField(const Frame& frame, std::vector<float> values, FieldCurve curve)
+    : frame_(frame), values_(std::move(values)), curve_(curve) {
   prepare();
+  if (curve_ == FieldCurve::catmull_rom) return;
+  // Along one axis after the other.
+  std::vector<double> line;
+  std::size_t stride = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<std::size_t>(frame_.dims[axis]);
+    line.resize(n);
+    for (std::size_t at = 0; at < values_.size(); ++at) {
+      if (at / stride % n != 0) continue;
+      for (std::size_t i = 0; i < n; ++i) line[i] = static_cast<double>(values_[at + i * stride]);
+      to_spline(line);
+      for (std::size_t i = 0; i < n; ++i) values_[at + i * stride] = static_cast<float>(line[i]);
+    }
+    stride *= n;
+  }
 }
 
 CubicField::CubicField(const SparseGrid& distance_mm) : frame_(distance_mm.frame) {
@@ -78,7 +120,11 @@ Clearance CubicField::operator()(Vec3 world_mm) const {
       return c;
     }
     lo[a] = std::min(static_cast<int>(x[a]), frame_.dims[a] - 3);
-    weights(static_cast<float>(x[a] - lo[a]), w[a], d[a]);
+    const auto t = static_cast<float>(x[a] - lo[a]);
+    if (curve_ == FieldCurve::spline)
+      spline_weights(t, w[a], d[a]);
+    else
+      weights(t, w[a], d[a]);
   }
   const std::size_t row = static_cast<std::size_t>(frame_.dims[0]), layer = row * static_cast<std::size_t>(frame_.dims[1]);
   const float* const base = values_.data() + static_cast<std::size_t>(lo[2] - 1) * layer + static_cast<std::size_t>(lo[1] - 1) * row +

@@ -36,6 +36,7 @@ HandRenderer::HandRenderer(const HapticRenderer::Common& common, const HapticSet
       vibration_(setup.vibration_json.empty() ? default_vibration() : parse_vibration(setup.vibration_json, "the session's vibration")),
       guard_(setup.params.guard, device_),
       instrument_(&instrument_library().front()) {
+  if (!setup.texture_json.empty()) texture_.emplace(parse_texture(setup.texture_json, "the session's texture"), number + 1, common.dt_s);
   if (curve != nullptr) constraint_.emplace(*curve, setup.curve_params);
   set();
 }
@@ -62,23 +63,50 @@ void HandRenderer::push(const SceneAction& a) noexcept {
   soft_.stiffness_n_per_mm = std::min(a.values[7], law_.stiffness_n_per_mm);
 }
 
+// A hand that leads, and whose time stands still: what it remembers stays for when it goes on.
+void HandRenderer::rest(const DeviceSample& sample) noexcept {
+  const auto force_n = record_.force_n;
+  record_ = {};
+  record_.device = sample;
+  record_.hand = static_cast<std::uint32_t>(number_);
+  record_.force_n = force_n;
+  contact_ = {};
+  touched_count_ = 0;
+  loaded_ = nullptr;
+  flags_ = 0;
+  cuts_ = false;
+  resting_ = true;
+}
+
 void HandRenderer::feel(const DeviceSample& sample) noexcept {
+  if (leads_ && (sample.buttons & kLeadStill) != 0) return rest(sample);
+  resting_ = false;
+  const GuideLaw::Hand before{record_.structure != 0 ? record_.clearance_mm : 1e9F};
   record_ = {};
   record_.device = sample;
   record_.hand = static_cast<std::uint32_t>(number_);
   flags_ = 0;
   Guard::Input in;
   place(sample, in);
-  meet();
+  const bool led = guide_.guide().on();
+  contact_ = {};
+  touched_count_ = 0;
+  loaded_ = nullptr;
+  if (!led || guide_.guide().own_contact) meet();
 
   Vec3 elastic = contact_.force_n, torque = contact_.torque_n_mm;
-  if (common_.params.effects.shaft && has_head()) shaft(elastic, torque);
+  if (common_.params.effects.shaft && has_head() && (!led || guide_.guide().own_contact)) shaft(elastic, torque);
   if (usable_ && !(soft_.normal == Vec3{})) {
     const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0, law_.max_force_n);
     elastic += soft_.normal * push;
     if (push > 0) flags_ |= kSoftContact;
   }
-  const Vec3 driven = effects();
+  Vec3 driven = effects();
+  if (led && usable_) {
+    const Vec3 pull = guide_.step(at_, before, leader_, leader_force_n_, common_.dt_s);
+    driven += pull;
+    if (!(pull == Vec3{})) flags_ |= kGuided;
+  }
   if (constraint_ && usable_) {
     const auto held = constraint_->update(at_);
     if (held.engaged) {
@@ -139,9 +167,6 @@ void HandRenderer::spin(std::uint8_t pedal) noexcept {
 
 // What the instrument or the plate meets.
 void HandRenderer::meet() noexcept {
-  contact_ = {};
-  touched_count_ = 0;
-  loaded_ = nullptr;
   if (!usable_) return;
   if (const PlateInHand* const held = plate()) {
     flags_ |= kPlateInHand;
@@ -263,10 +288,13 @@ void HandRenderer::shaft(Vec3& elastic, Vec3& torque) noexcept {
   if (push > 0) flags_ |= kShaftContact;
 }
 
-// Of a burr that turns.
+// Of a burr that turns; of all else what it slides over.
 Vec3 HandRenderer::effects() noexcept {
   const Burr* const burr = instrument_->as_burr();
-  if (pose_.pedal == 0 || burr == nullptr) return {};
+  const bool turns = pose_.pedal != 0 && burr != nullptr;
+  Vec3 shaken{};
+  if (texture_ && usable_) shaken = texture_->step(at_, contact_.normal, turns || plate() ? 0 : contact_.normal_force_n);
+  if (!turns) return shaken;
   const EffectParams& with = common_.params.effects;
   const double speed = speed_rpm_ / Burr::kNominalRpm, turn = with.left_handed ? -1 : 1;
   Vec3 driven = cross(contact_.normal, axis_) * (turn * std::min(1.0, speed) * with.drag * contact_.normal_force_n);

@@ -1,7 +1,9 @@
 // What one hand feels and what its burr takes away.
 #pragma once
 #include "contact_models.h"
+#include "osteo/haptics/guide.h"
 #include "osteo/haptics/renderer.h"
+#include "osteo/haptics/texture.h"
 
 namespace osteo {
 
@@ -21,6 +23,14 @@ class HandRenderer {
   /// The settings have changed.
   void set() noexcept;
   void push(const SceneAction& soft_push) noexcept;
+  void guide(const HandGuide& guide) noexcept { guide_.set(guide, device_, common_.params.guard.contact_damping_n_s_per_m, common_.dt_s); }
+  [[nodiscard]] const HandGuide& guided() const { return guide_.guide(); }
+  /// Whether it leads another in the tick to come, and by whom it is led.
+  void leads(bool on) noexcept { leads_ = on; }
+  void led(const DeviceSample& leader, Vec3 force_n) noexcept {
+    leader_ = leader;
+    leader_force_n_ = force_n;
+  }
   /// From a pose to a force, on the bone as it is.
   void feel(const DeviceSample& sample) noexcept;
   /// Writes behind the first `count` changes of the scene, and counts on.
@@ -32,7 +42,7 @@ class HandRenderer {
   [[nodiscard]] double stiffness_n_per_mm() const { return law_.stiffness_n_per_mm; }
   [[nodiscard]] bool cuts() const { return cuts_; }
   /// Its instrument's head can touch something: where it is shown.
-  [[nodiscard]] bool has_head() const { return usable_ && !plate(); }
+  [[nodiscard]] bool has_head() const { return usable_ && !resting_ && !plate(); }
   [[nodiscard]] const RoundCone& head() const { return instrument_->head; }
   [[nodiscard]] Vec3 shown_mm() const { return at_ + contact_.shown_offset_mm; }
   [[nodiscard]] Vec3 axis() const { return axis_; }
@@ -46,6 +56,7 @@ class HandRenderer {
     ContactResult contact;  // in the world
   };
   [[nodiscard]] const PlateInHand* plate() const { return common_.scene->held[number_].plate.get(); }
+  void rest(const DeviceSample& sample) noexcept;
   void place(const DeviceSample& sample, Guard::Input& in) noexcept;
   void spin(std::uint8_t pedal) noexcept;
   void meet() noexcept;
@@ -61,12 +72,17 @@ class HandRenderer {
   const DeviceTraits device_;
   ContactParams law_;  // with the stiffness that its device bears
   Vibration vibration_;
+  std::optional<SlidingTexture> texture_;
   std::optional<CurveConstraint> constraint_;
   Guard guard_;
   struct {
     Vec3 at_mm, normal;
     double force_n = 0, stiffness_n_per_mm = 0;
   } soft_;
+  GuideLaw guide_;
+  DeviceSample leader_;
+  Vec3 leader_force_n_;
+  bool leads_ = false, resting_ = false;
   // What it remembers of the tick before.
   DeviceSample last_good_;
   bool has_last_ = false;

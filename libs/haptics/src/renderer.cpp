@@ -70,6 +70,24 @@ void HapticRenderer::push(const SceneAction& soft_push) noexcept {
   if (soft_push.hand < hands_.size()) hands_[soft_push.hand]->push(soft_push);
 }
 
+void HapticRenderer::guide(const SceneAction& action) noexcept {
+  const HandGuide guide = guide_of(action);
+  if (guide.hand >= hands_.size() || guide.leader >= hands_.size()) return;
+  hands_[guide.hand]->guide(guide);
+  any_led_ = std::any_of(hands_.begin(), hands_.end(), [](const auto& h) { return h->guided().on(); });
+}
+
+// Who leads, and what the led are told of it: poses of this tick, the leader's force of the tick before.
+void HapticRenderer::lead(std::span<const DeviceSample> samples) noexcept {
+  for (const auto& hand : hands_) hand->leads(!hand->guided().on());  // other hands of a lesson stand still with the first
+  for (const auto& hand : hands_) {
+    const HandGuide& guide = hand->guided();
+    if (!guide.on()) continue;
+    hands_[guide.leader]->leads(true);
+    hand->led(samples[guide.leader], from_floats(records_[guide.leader].force_n));
+  }
+}
+
 const ContactResult& HapticRenderer::contact(std::size_t hand) const {
   return hands_[hand]->contact();
 }
@@ -102,6 +120,7 @@ std::map<std::uint32_t, StructureEvents> HapticRenderer::structure_events() cons
 
 HapticRenderer::Step HapticRenderer::step(std::span<const DeviceSample> samples) noexcept {
   HapticScene& scene = *common_->scene;
+  if (any_led_) lead(samples);
   for (std::size_t h = 0; h < hands_.size(); ++h) hands_[h]->feel(samples[h]);
   if (anatomy_.structures && !scene.items.empty()) {
     std::fill(met_.begin(), met_.end(), std::uint8_t{0});

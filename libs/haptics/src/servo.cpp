@@ -35,6 +35,7 @@ void Servo::take_up(std::uint64_t tick) noexcept {
   if (h->settings != nullptr) renderer_.set(*h->settings);
   renderer_.hold(h->held);
   if (action.is(ActionKind::soft_push)) renderer_.push(action);
+  if (action.is(ActionKind::guide)) renderer_.guide(action);
   stream_.publish(action);
   inbox_.store(nullptr, std::memory_order_release);
 }

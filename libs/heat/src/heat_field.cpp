@@ -10,9 +10,17 @@ namespace osteo {
 namespace {
 
 constexpr double kMm3PerM3 = 1e9, kMmPerM = 1e3, kMm2PerM2 = 1e6;
-constexpr int kStep[3] = {1, 8, 64};
-// Of the longest stable step: errors of second order in space and time then cancel, averaged over all directions (alpha dt / h2 = 1/10).
-constexpr double kOfLongest = 0.6;
+// Lattices with a layer more on one side (links) and on both (what is looked at): x fastest, first cell at -1.
+constexpr int kLink[3] = {1, 9, 81}, kWide[3] = {1, 10, 100};
+constexpr int kWideCells = 1000;
+constexpr int at_link(int x, int y, int z) {
+  return x + 1 + 9 * (y + 1) + 81 * (z + 1);
+}
+constexpr int at_wide(int x, int y, int z) {
+  return x + 1 + 10 * (y + 1) + 100 * (z + 1);
+}
+constexpr int kSelf = 13;
+constexpr std::size_t kFaces[6] = {12, 14, 10, 16, 4, 22};  // -x +x -y +y -z +z of the 27 around
 
 Ijk brick_of(Ijk c) {
   return {c.i >> 3, c.j >> 3, c.k >> 3};
@@ -25,8 +33,30 @@ Ijk beside(Ijk c, int direction) {
   (direction < 2 ? c.i : direction < 4 ? c.j : c.k) += by;
   return c;
 }
-float least(float a, float b) {
-  return b < a ? b : a;
+Ijk around(Ijk c, int n) {
+  return {c.i + n % 3 - 1, c.j + n / 3 % 3 - 1, c.k + n / 9 - 1};
+}
+
+// A brick's values with one layer of those around it, 0 where none is made. value(brick) gives the 512 of a brick.
+template <class T, class Brick, class Value>
+void widen(const Brick& b, Value value, std::array<T, kWideCells>& out) {
+  for (int n = 0; n < 27; ++n) {
+    const Brick* const from = b.around[static_cast<std::size_t>(n)];
+    int lo[3], hi[3], off[3];
+    const int side[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+    for (int a = 0; a < 3; ++a) {
+      lo[a] = side[a] == 0 ? 0 : side[a] < 0 ? -1 : 8;
+      hi[a] = side[a] == 0 ? 8 : lo[a] + 1;
+      off[a] = -8 * side[a];
+    }
+    for (int z = lo[2]; z < hi[2]; ++z) {
+      for (int y = lo[1]; y < hi[1]; ++y) {
+        const int row = (y + off[1]) * 8 + (z + off[2]) * 64 + off[0];
+        for (int x = lo[0]; x < hi[0]; ++x)
+          out[static_cast<std::size_t>(at_wide(x, y, z))] = from == nullptr ? T{} : value(*from)[static_cast<std::size_t>(row + x)];
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -64,17 +94,47 @@ void HeatField::fill(Brick& b, int cell, HeatMatter m) const {
   b.share[c] = any ? static_cast<float>(bone + tissue) : 0;
 }
 
-// Faces of a brick along an axis, the last of them to the brick beside.
-void HeatField::join(Brick& b, int axis) {
-  auto& face = b.face[static_cast<std::size_t>(axis)];
-  const int by = kStep[axis];
-  const Brick* const next = b.beside[static_cast<std::size_t>(2 * axis + 1)];
-  for (int c = 0; c < kCells; ++c) {
-    const bool last = (c / by & 7) == 7;
-    const float other = !last ? b.conducts[static_cast<std::size_t>(c + by)]
-                              : (next != nullptr ? next->conducts[static_cast<std::size_t>(c - 7 * by)] : 0.0F);
-    face[static_cast<std::size_t>(c)] = least(b.conducts[static_cast<std::size_t>(c)], other);
+void HeatField::links_are_old_around(Brick& b) {
+  for (Brick* const other : b.around) {
+    if (other != nullptr) other->links_old = true;
   }
+}
+
+// Of a square of four full cells a sixth goes along each diagonal and a twelfth along each side, else a quarter along each side: both let
+// the same heat through along either axis.
+void HeatField::link(Brick& b) {
+  std::array<float, kWideCells> k;
+  widen(
+      b, [](const Brick& from) -> const auto& { return from.conducts; }, k);
+  for (std::size_t normal = 0; normal < 3; ++normal) {
+    const int u = kWide[(normal + 1) % 3], v = kWide[(normal + 2) % 3];
+    for (int z = -1; z < 8; ++z) {
+      for (int y = -1; y < 8; ++y) {
+        for (int x = -1; x < 8; ++x) {
+          const float* const c = &k[static_cast<std::size_t>(at_wide(x, y, z))];
+          b.diagonal[normal][static_cast<std::size_t>(at_link(x, y, z))] = std::min(std::min(c[0], c[u]), std::min(c[v], c[u + v])) / 6;
+        }
+      }
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // The four squares that have this edge: two about each of the other axes.
+    const auto &p = b.diagonal[(axis + 1) % 3], &q = b.diagonal[(axis + 2) % 3];
+    const int along_p = kLink[(axis + 2) % 3], along_q = kLink[(axis + 1) % 3];
+    const int own[3] = {axis == 0 ? -1 : 0, axis == 1 ? -1 : 0, axis == 2 ? -1 : 0};
+    for (int z = own[2]; z < 8; ++z) {
+      for (int y = own[1]; y < 8; ++y) {
+        for (int x = own[0]; x < 8; ++x) {
+          const int c = at_link(x, y, z);
+          const float* const two = &k[static_cast<std::size_t>(at_wide(x, y, z))];
+          const auto of = [](const auto& all, int n) { return all[static_cast<std::size_t>(n)]; };
+          b.face[axis][static_cast<std::size_t>(c)] =
+              std::max(0.0F, std::min(two[0], two[kWide[axis]]) - ((of(p, c) + of(p, c - along_p)) + (of(q, c) + of(q, c - along_q))));
+        }
+      }
+    }
+  }
+  b.links_old = false;
 }
 
 HeatField::Brick& HeatField::make(Ijk at) {
@@ -84,14 +144,13 @@ HeatField::Brick& HeatField::make(Ijk at) {
   Brick& b = *made;
   b.at = at;
   for (int c = 0; c < kCells; ++c) fill(b, c, matter_({at.i * 8 + (c & 7), at.j * 8 + (c >> 3 & 7), at.k * 8 + (c >> 6)}));
-  for (int d = 0; d < 6; ++d) {
-    const auto it = bricks_.find(key_of(beside(at, d)));
+  for (int n = 0; n < 27; ++n) {
+    const auto it = bricks_.find(key_of(around(at, n)));
     if (it == bricks_.end() || !it->second) continue;
-    b.beside[static_cast<std::size_t>(d)] = it->second.get();
-    it->second->beside[static_cast<std::size_t>(d ^ 1)] = &b;
-    if (d % 2 == 0) join(*it->second, d / 2);
+    b.around[static_cast<std::size_t>(n)] = it->second.get();
+    it->second->around[static_cast<std::size_t>(26 - n)] = &b;
   }
-  for (int axis = 0; axis < 3; ++axis) join(b, axis);
+  links_are_old_around(b);
   return b;
 }
 
@@ -152,7 +211,6 @@ void HeatField::cool(const Ball& where, double film_w_per_m2_k, double water_k) 
     b.water[c] = static_cast<float>(water_k);
     b.cooled = true;
   });
-  strongest_film_ = std::max(strongest_film_, film_w_per_m2_k);
 }
 
 void HeatField::set_matter(Ijk cell, HeatMatter now) {
@@ -173,35 +231,17 @@ void HeatField::set_matter(Ijk cell, HeatMatter now) {
   } else if (after > 0) {
     b.kelvin[c] = heat / after;
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const int by = kStep[axis], along = static_cast<int>(c) / by & 7;
-    const auto a = static_cast<std::size_t>(axis);
-    if (along < 7) {
-      b.face[a][c] = least(b.conducts[c], b.conducts[c + static_cast<std::size_t>(by)]);
-    } else if (const Brick* const next = b.beside[2 * a + 1]) {
-      b.face[a][c] = least(b.conducts[c], next->conducts[c - static_cast<std::size_t>(7 * by)]);
-    }
-    if (along > 0) {
-      b.face[a][c - static_cast<std::size_t>(by)] = least(b.conducts[c], b.conducts[c - static_cast<std::size_t>(by)]);
-    } else if (Brick* const last = b.beside[2 * a]) {
-      const std::size_t there = c + static_cast<std::size_t>(7 * by);
-      last->face[a][there] = least(b.conducts[c], last->conducts[there]);
-    }
-  }
+  links_are_old_around(b);
 }
 
-double HeatField::longest_step_s(double film_w_per_m2_k) const {
-  const double film = film_w_per_m2_k / kMm2PerM2 * cell_mm_ * cell_mm_;
-  const auto longest = [&](double holds, double conducts) {
-    return holds / (6 * conducts + (film > 0 ? 6 / (1 / film + 1 / (2 * conducts)) : 0));
-  };
-  return std::min(longest(bone_j_per_k_, bone_w_per_k_), longest(tissue_j_per_k_, tissue_w_per_k_));
+double HeatField::longest_step_s() const {
+  return std::min(bone_j_per_k_ / bone_w_per_k_, tissue_j_per_k_ / tissue_w_per_k_) / 6;
 }
 
 void HeatField::step(double seconds) {
   if (!(seconds > 0) || !std::isfinite(seconds)) return;
-  const double most = kOfLongest * longest_step_s(strongest_film_);
-  const int steps = std::max(1, static_cast<int>(std::ceil(seconds / most)));
+  // A whole number of steps stays one, whatever the last bit of a quotient says.
+  const int steps = std::max(1, static_cast<int>(std::ceil(seconds / longest_step_s() * (1 - 1e-9))));
   for (int s = 0; s < steps; ++s) {
     // Half of a step's heat before it, half behind: of second order like the rest.
     heat(0.5 / steps);
@@ -214,7 +254,6 @@ void HeatField::step(double seconds) {
     if (b->cooled) b->film.fill(0);
     b->heated = b->cooled = false;
   }
-  strongest_film_ = 0;
 }
 
 void HeatField::heat(double share) {
@@ -227,53 +266,44 @@ void HeatField::heat(double share) {
 }
 
 void HeatField::conduct(double seconds) {
-  // Along a row, a plane, a brick: the loops over x are plain vectors.
+  // Each cell asks its neighbours: what two say of their common link differs in sign only. Loops over x are plain vectors.
+  std::array<double, kWideCells> wide;
   for (auto& [key, made] : bricks_) {
     Brick& b = *made;
-    const double* const t = b.kelvin.data();
-    double* const q = b.change.data();
-    for (int axis = 0; axis < 3; ++axis) {
-      const int by = kStep[axis];
-      const float* const face = b.face[static_cast<std::size_t>(axis)].data();
-      const auto inside = [&](int c) {
-        const double flow = static_cast<double>(face[c]) * (t[c + by] - t[c]);
-        q[c] += flow;
-        q[c + by] -= flow;
-      };
-      if (axis == 0) {
-        for (int row = 0; row < kCells; row += 8) {
-          for (int c = row; c < row + 7; ++c) inside(c);
+    if (b.links_old) link(b);
+    widen(
+        b, [](const Brick& from) -> const auto& { return from.kelvin; }, wide);
+    for (int z = 0; z < 8; ++z) {
+      for (int y = 0; y < 8; ++y) {
+        const double* const t = &wide[static_cast<std::size_t>(at_wide(0, y, z))];
+        const int first = at_link(0, y, z);
+        double* const q = &b.change[static_cast<std::size_t>(8 * y + 64 * z)];
+        for (int x = 0; x < 8; ++x) q[x] = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const float* const face = &b.face[axis][static_cast<std::size_t>(first)];
+          const int by = kWide[axis], back = kLink[axis];
+          for (int x = 0; x < 8; ++x)
+            q[x] += static_cast<double>(face[x]) * (t[x + by] - t[x]) + static_cast<double>(face[x - back]) * (t[x - by] - t[x]);
+          const float* const d = &b.diagonal[axis][static_cast<std::size_t>(first)];
+          const int u = kWide[(axis + 1) % 3], v = kWide[(axis + 2) % 3], lu = kLink[(axis + 1) % 3], lv = kLink[(axis + 2) % 3];
+          for (int x = 0; x < 8; ++x) {
+            q[x] += (static_cast<double>(d[x]) * (t[x + u + v] - t[x]) + static_cast<double>(d[x - lu - lv]) * (t[x - u - v] - t[x])) +
+                    (static_cast<double>(d[x - lu]) * (t[x - u + v] - t[x]) + static_cast<double>(d[x - lv]) * (t[x + u - v] - t[x]));
+          }
         }
-      } else if (axis == 1) {
-        for (int plane = 0; plane < kCells; plane += 64) {
-          for (int c = plane; c < plane + 56; ++c) inside(c);
-        }
-      } else {
-        for (int c = 0; c < kCells - 64; ++c) inside(c);
-      }
-      Brick* const next = b.beside[static_cast<std::size_t>(2 * axis + 1)];
-      if (next == nullptr) continue;
-      for (int n = 0; n < 64; ++n) {
-        const int c = axis == 0 ? 8 * n + 7 : axis == 1 ? (n >> 3) * 64 + 56 + (n & 7) : 448 + n;
-        const double flow = static_cast<double>(face[c]) * (next->kelvin[static_cast<std::size_t>(c - 7 * by)] - t[c]);
-        q[c] += flow;
-        next->change[static_cast<std::size_t>(c - 7 * by)] -= flow;
       }
     }
   }
   for (auto& [key, made] : bricks_) {
     Brick& b = *made;
-    if (b.cooled) {
-      for (std::size_t c = 0; c < kCells; ++c) {
-        const double flow = static_cast<double>(b.film[c]) * (b.kelvin[c] - static_cast<double>(b.water[c]));
-        b.change[c] -= flow;
-        ledger_.cooled_j += flow * seconds;
-      }
-    }
     for (std::size_t c = 0; c < kCells; ++c) {
       const double holds = static_cast<double>(b.capacity[c]);
-      b.kelvin[c] += holds > 0 ? b.change[c] * seconds / holds : 0;
-      b.change[c] = 0;
+      // Water halfway between before and after: stable however strong the film, since an open face stands where a neighbour would.
+      const double film = b.cooled ? 0.5 * seconds * static_cast<double>(b.film[c]) : 0, water = static_cast<double>(b.water[c]);
+      if (!(holds > 0)) continue;
+      const double before = b.kelvin[c];
+      b.kelvin[c] = (before * (holds - film) + b.change[c] * seconds + 2 * film * water) / (holds + film);
+      if (film > 0) ledger_.cooled_j += film * (before + b.kelvin[c] - 2 * water);
     }
   }
 }
@@ -292,7 +322,7 @@ void HeatField::wake_and_forget() {
   for (const auto& [key, b] : bricks_) {
     bool fed = b->heated || b->cooled;
     for (int d = 0; d < 6; ++d) {
-      const Brick* const other = b->beside[static_cast<std::size_t>(d)];
+      const Brick* const other = b->around[kFaces[d]];
       if (other != nullptr) {
         fed = fed || warm_side(*other, d ^ 1);
       } else if (warm_side(*b, d)) {
@@ -307,11 +337,10 @@ void HeatField::wake_and_forget() {
     const auto it = bricks_.find(key);
     Brick& b = *it->second;
     for (std::size_t c = 0; c < kCells; ++c) ledger_.forgotten_j += b.kelvin[c] * static_cast<double>(b.capacity[c]);
-    for (int d = 0; d < 6; ++d) {
-      Brick* const other = b.beside[static_cast<std::size_t>(d)];
-      if (other == nullptr) continue;
-      other->beside[static_cast<std::size_t>(d ^ 1)] = nullptr;
-      if (d % 2 == 0) join(*other, d / 2);
+    links_are_old_around(b);
+    for (int n = 0; n < 27; ++n) {
+      if (Brick* const other = b.around[static_cast<std::size_t>(n)]; other != nullptr && n != kSelf)
+        other->around[static_cast<std::size_t>(26 - n)] = nullptr;
     }
     bricks_.erase(it);
   }

@@ -96,7 +96,7 @@ Labels each_slice(const Labels& labels, std::uint8_t value, int axis, const Cont
   return out;
 }
 
-cv::Mat mat_of(const Plane& p) {
+cv::Mat mat_of(const PlaneImage& p) {
   image::without_own_threads();
   if (p.width < 8 || p.height < 8 || p.values.size() != static_cast<std::size_t>(p.width) * static_cast<std::size_t>(p.height))
     throw Error(ExitCode::usage, "a plane to be matched has at least 8 x 8 values");
@@ -187,7 +187,7 @@ Picture thumbnail(const Image& image, SliceAt slice, int pixels, double lo, doub
   return p;
 }
 
-PlaneMatch match_by_phase(const Plane& first, const Plane& second) {
+PlaneMatch match_by_phase(const PlaneImage& first, const PlaneImage& second) {
   const cv::Mat a = mat_of(first), b = mat_of(second);
   if (a.size() != b.size()) throw Error(ExitCode::usage, "planes to be matched have one size");
   cv::Mat window;
@@ -198,7 +198,7 @@ PlaneMatch match_by_phase(const Plane& first, const Plane& second) {
   return {shift.x, shift.y, 0, score};
 }
 
-PlaneMatch match_by_correlation(const Plane& first, const Plane& second, const PlaneMatch& guess) {
+PlaneMatch match_by_correlation(const PlaneImage& first, const PlaneImage& second, const PlaneMatch& guess) {
   const cv::Mat a = mat_of(first), b = mat_of(second);
   // OpenCV turns about the corner.
   const double cx = 0.5 * (a.cols - 1), cy = 0.5 * (a.rows - 1), c = std::cos(guess.angle_rad), s = std::sin(guess.angle_rad);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "osteo/base/error.h"
+#include "osteo/base/param.h"
 
 namespace osteo {
 namespace {
@@ -197,9 +198,18 @@ class Parser {
       if (!file_.tet_of.try_emplace(e.number, static_cast<std::uint32_t>(file_.mesh.tets.size())).second)
         throw Error(ExitCode::corrupt, "'" + name_ + "': element " + std::to_string(e.number) + " is there twice");
       file_.corners_of[e.number] = t;
-      const Vec3 a = from_floats(file_.mesh.points_mm[t[0]]), b = from_floats(file_.mesh.points_mm[t[1]]) - a,
-                 c = from_floats(file_.mesh.points_mm[t[2]]) - a, d = from_floats(file_.mesh.points_mm[t[3]]) - a;
-      if (dot(cross(b, c), d) < 0) std::swap(t[2], t[3]);
+      const auto six_volumes = [](Vec3 p, Vec3 q, Vec3 r, Vec3 s) { return dot(cross(q - p, r - p), s - p); };
+      const auto kept = [&](std::size_t i) { return from_floats(file_.mesh.points_mm[t[i]]); };
+      const auto written = [&](std::size_t i) { return nodes_[at(e, i)].second; };
+      const double true_volume = six_volumes(written(0), written(1), written(2), written(3)),
+                   volume = six_volumes(kept(0), kept(1), kept(2), kept(3));
+      if (true_volume != 0 && !(volume / true_volume > 0.5 && volume / true_volume < 2))
+        throw Error(ExitCode::corrupt,
+                    "'" + name_ + "', element " + std::to_string(e.number) +
+                        ": coordinates are kept in single precision, which turns its volume of " + format_number(true_volume / 6) +
+                        " mm3 into " + format_number(volume / 6),
+                    "move the body nearer to the origin");
+      if (volume < 0) std::swap(t[2], t[3]);
       file_.mesh.tets.push_back(t);
     }
   }

@@ -11,6 +11,9 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
+#include <cmath>
+#include <fstream>
+#include <string>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -42,6 +45,17 @@ void write_with(Writer* writer, vtkPolyData* data, const fs::path& path) {
   });
 }
 
+// An STL file in text without "facet", or in bytes that counts none.
+bool holds_no_facet(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head(1 << 16, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  if (head.size() == 84 && head.compare(80, 4, std::string(4, '\0')) == 0) return true;
+  return head.starts_with("solid") && head.size() < (1 << 16) && head.find('\0') == std::string::npos &&
+         head.find("facet") == std::string::npos && head.find("FACET") == std::string::npos;
+}
+
 }  // namespace
 
 bool is_surface_file(const fs::path& path) {
@@ -54,7 +68,12 @@ Surface load_surface(const fs::path& path) {
   const auto e = path.extension();
   vtkSmartPointer<vtkPolyData> poly;
   if (e == ".ply") poly = read_with<vtkPLYReader>(path);
-  if (e == ".stl") poly = read_with<vtkSTLReader>(path);
+  if (e == ".stl") {
+    // VTK's reader calls a file without a facet damaged in words of its own.
+    if (fs::file_size(path) == 0) throw Error(ExitCode::corrupt, "'" + path.string() + "' is empty: no byte is in it");
+    if (holds_no_facet(path)) throw Error(ExitCode::corrupt, "'" + path.string() + "': it holds no triangles");
+    poly = read_with<vtkSTLReader>(path);
+  }
   if (e == ".obj") poly = io::read_obj(path);
   if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
   if (!poly)
@@ -69,6 +88,13 @@ Surface load_surface(const fs::path& path) {
 }
 
 void save_surface(const TriMesh& mesh, const fs::path& path) {
+  for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) {
+    for (const float v : mesh.points_mm[p]) {
+      if (!std::isfinite(v))
+        throw Error(ExitCode::failed,
+                    "the surface is not written: point " + std::to_string(p) + " has a coordinate that is no finite number");
+    }
+  }
   const auto e = path.extension();
   if (e == ".ply") return write_file(path, io::ply_text(mesh));
   if (e == ".stl") return write_file(path, stl_text(mesh));

@@ -17,6 +17,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/param.h"
+#include "osteo/data/tet_check.h"
 #include "osteo/io/inp_io.h"
 #include "osteo/io/vtk_data.h"
 
@@ -144,6 +145,27 @@ TetMesh load_vtu(const fs::path& path) {
   }
 }
 
+// Corners are what a mesh is made of here: points that are only in the middle of edges are left out.
+void drop_middles(TetMesh& mesh, std::vector<bool> middle) {
+  for (const auto& t : mesh.tets) {
+    for (const std::uint32_t p : t) middle[p] = false;
+  }
+  std::vector<std::uint32_t> place(mesh.points_mm.size());
+  std::uint32_t kept = 0;
+  for (std::size_t p = 0; p < place.size(); ++p) {
+    place[p] = kept;
+    if (middle[p]) continue;
+    mesh.points_mm[kept] = mesh.points_mm[p];
+    if (!mesh.values.empty()) mesh.values[kept] = mesh.values[p];
+    ++kept;
+  }
+  mesh.points_mm.resize(kept);
+  if (!mesh.values.empty()) mesh.values.resize(kept);
+  for (auto& t : mesh.tets) {
+    for (std::uint32_t& p : t) p = place[p];
+  }
+}
+
 void append_number(std::string& text, double v) {
   char buffer[32];
   const auto [end, problem] = std::to_chars(buffer, buffer + sizeof buffer, static_cast<float>(v));
@@ -180,10 +202,18 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
     mesh.points_mm.push_back({static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])});
   }
   vtkNew<vtkIdList> ids;
+  std::vector<bool> middle(mesh.points_mm.size());
+  bool quadratic = false;
   for (vtkIdType c = 0; c < grid->GetNumberOfCells(); ++c) {
     grid->GetCellPoints(c, ids);
-    if (grid->GetCellType(c) != VTK_TETRA || ids->GetNumberOfIds() != 4) {
+    const bool ten = grid->GetCellType(c) == VTK_QUADRATIC_TETRA && ids->GetNumberOfIds() == 10;
+    if (!ten && (grid->GetCellType(c) != VTK_TETRA || ids->GetNumberOfIds() != 4)) {
       throw Error(ExitCode::corrupt, "cell " + std::to_string(c) + " is no tetrahedron");
+    }
+    quadratic = quadratic || ten;
+    for (vtkIdType k = 4; k < ids->GetNumberOfIds(); ++k) {
+      const vtkIdType id = ids->GetId(k);
+      if (id >= 0 && id < grid->GetNumberOfPoints()) middle[static_cast<std::size_t>(id)] = true;
     }
     std::array<std::uint32_t, 4> t{};
     for (int k = 0; k < 4; ++k) {
@@ -200,6 +230,7 @@ TetMesh tets_from_vtk(vtkUnstructuredGrid* grid) {
     mesh.values_name = values->GetName();
     for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) mesh.values.push_back(static_cast<float>(values->GetComponent(i, 0)));
   }
+  if (quadratic) drop_middles(mesh, middle);
   turn_round(mesh);
   return mesh;
 }
@@ -231,6 +262,7 @@ vtkSmartPointer<vtkUnstructuredGrid> to_vtk(const TetMesh& mesh) {
 }
 
 void save_tets(const TetMesh& mesh, const fs::path& path) {
+  require_sound(mesh);
   const std::string s = suffix_of(path);
   if (s == ".vtu") {
     write_atomically(path, [&](const fs::path& temporary) {

@@ -138,12 +138,12 @@ void PenLink::tell(const PenSight& sight, bool) {
 
 MarkerDevice::MarkerDevice(std::shared_ptr<PenLink> link, const CameraModel& camera, const HandGoal& start, const Mat3& scene_from_camera,
                            double scale, const FootPedal* pedal, std::size_t hand)
-    : link_(std::move(link)),
+    : TunedHand(hand),
+      link_(std::move(link)),
       scene_from_camera_(scene_from_camera),
       scale_(scale),
       patience_ms_(camera.delay_ms() + 2.5 * camera.period_ms()),
       pedal_(pedal),
-      pedal_bit_(osteo::pedal_bit(hand)),
       tool_(start.tool),
       map_(start.position_mm, scene_from_camera, scale),
       goal_(start),
@@ -167,7 +167,9 @@ DeviceSample MarkerDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexce
   static_cast<void>(link_->latest(last_));
   const std::int64_t now = monotonic_ns();
   const double since_ms = last_.of_ns == 0 ? 1e9 : static_cast<double>(now - last_.of_ns) / 1e6;
-  const std::uint32_t pressed = pedal_ != nullptr ? pedal_->pressed() : 0;
+  const HandTuning& t = tuning();
+  const std::uint32_t switches = pedal_ != nullptr ? pedal_->pressed() : 0;
+  map_.rescale(t.scale);
   double silent_ms = 0;
   if (since_ms > patience_ms_) {
     // Nothing pulls the tool; bone may push it out while the force fades.
@@ -181,12 +183,13 @@ DeviceSample MarkerDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexce
     if (out_of_sight_) {
       hand_.start(goal_.position_mm);
       map_ = WorkspaceMap(hand_.position_mm(), scene_from_camera_, scale_);
+      map_.rescale(t.scale);
       turning_ = true;
       out_of_sight_ = false;
     }
-    goal_.position_mm = map_.update(last_.motion.tip_at(ahead_s), (pressed & 2U) != 0 || keys_->clutch);
+    goal_.position_mm = map_.update(last_.motion.tip_at(ahead_s), t.clutch || (switches & t.clutch_switches) != 0);
     axis_ = towards(normalized(scene_from_camera_ * last_.motion.rotation_at(ahead_s).column[2]), dt_s);
-    goal_.pedal = (pressed & pedal_bit_) != 0 || keys_->drill ? 255 : 0;
+    goal_.pedal = pedal_of(t, 0, switches);
   }
   goal_.axis = to_floats(axis_);
   goal_.tool = tool_;

@@ -1,28 +1,19 @@
 #include "osteo/marker/sheet.h"
 
 #include <cairo-pdf.h>
-#include <pango/pangocairo.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <numbers>
 #include <set>
 #include <vector>
 
 #include "aruco.h"
 #include "osteo/base/error.h"
+#include "osteo/report/cairo_owned.h"
 
 namespace osteo {
 namespace {
-
-struct Free {
-  void operator()(cairo_surface_t* s) const { cairo_surface_destroy(s); }
-  void operator()(cairo_t* c) const { cairo_destroy(c); }
-  void operator()(PangoLayout* l) const { g_object_unref(l); }
-};
-template <class T>
-using Owned = std::unique_ptr<T, Free>;
 
 struct Size {
   double width_mm, height_mm;
@@ -65,7 +56,7 @@ class Page {
     cairo_stroke(cairo_);
   }
   void text(const std::string& what, double x, double y, double width, double size_mm) const {
-    const Owned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
+    const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
     PangoFontDescription* const font = pango_font_description_from_string("Liberation Sans, DejaVu Sans, Sans");
     pango_font_description_set_absolute_size(font, size_mm * dots_ * PANGO_SCALE);
     pango_layout_set_font_description(layout.get(), font);
@@ -199,9 +190,9 @@ GrayPicture marker_page(Paper paper, int pen, int number, double dots_per_inch) 
   const Size s = size_of(paper);
   const double dots = dots_per_inch / 25.4;
   const int w = static_cast<int>(std::ceil(s.width_mm * dots)), h = static_cast<int>(std::ceil(s.height_mm * dots));
-  const Owned<cairo_surface_t> surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, w, h));
+  const CairoOwned<cairo_surface_t> surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, w, h));
   {
-    const Owned<cairo_t> cairo(cairo_create(surface.get()));
+    const CairoOwned<cairo_t> cairo(cairo_create(surface.get()));
     draw_page(Page(cairo.get(), s, dots), pen, number);
   }
   cairo_surface_flush(surface.get());
@@ -262,11 +253,11 @@ std::string marker_pages_pdf(Paper paper, int pen) {
     static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(data), length);
     return CAIRO_STATUS_SUCCESS;
   };
-  const Owned<cairo_surface_t> surface(cairo_pdf_surface_create_for_stream(take, &pdf, s.width_mm * kPoints, s.height_mm * kPoints));
+  const CairoOwned<cairo_surface_t> surface(cairo_pdf_surface_create_for_stream(take, &pdf, s.width_mm * kPoints, s.height_mm * kPoints));
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, "Osteotome: markers");
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
   {
-    const Owned<cairo_t> cairo(cairo_create(surface.get()));
+    const CairoOwned<cairo_t> cairo(cairo_create(surface.get()));
     for (int p = 0; p < kMarkerPages; ++p) {
       draw_page(Page(cairo.get(), s, kPoints), pen, p);
       cairo_show_page(cairo.get());

@@ -242,7 +242,7 @@ TriangleSoup repaired(const TriMesh& mesh, const RepairOptions& options, RepairR
       ++report.dropped_bodies;
       continue;
     }
-    if (open[b] != 0 || volume[b] >= 0) continue;
+    if (!options.turn_bodies || open[b] != 0 || volume[b] >= 0) continue;
     // Facing inward is right for a cavity: inside the box of a larger body that faces outward.
     bool cavity = false;
     for (std::uint32_t other = 0; other < count && !cavity; ++other) {

@@ -45,21 +45,29 @@ BoxMm bounds_of(const TriangleSoup& soup) {
   return box;
 }
 
-TriMesh mesh_of(const TriangleSoup& soup) {
+TriangleSoup compacted(const TriangleSoup& soup) {
   constexpr std::uint32_t kUnused = 0xffffffffU;
   std::vector<std::uint32_t> place(soup.points_mm.size(), kUnused);
-  TriMesh mesh;
+  TriangleSoup result;
   for (auto t : soup.triangles) {
     for (auto& v : t) {
       if (place[v] == kUnused) {
-        place[v] = static_cast<std::uint32_t>(mesh.points_mm.size());
-        const Vec3 p = soup.points_mm[v];
-        mesh.points_mm.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+        place[v] = static_cast<std::uint32_t>(result.points_mm.size());
+        result.points_mm.push_back(soup.points_mm[v]);
       }
       v = place[v];
     }
-    mesh.triangles.push_back(t);
+    result.triangles.push_back(t);
   }
+  return result;
+}
+
+TriMesh mesh_of(const TriangleSoup& soup) {
+  TriangleSoup used = compacted(soup);
+  TriMesh mesh;
+  mesh.points_mm.reserve(used.points_mm.size());
+  for (const Vec3 p : used.points_mm) mesh.points_mm.push_back(to_floats(p));
+  mesh.triangles = std::move(used.triangles);
   return mesh;
 }
 

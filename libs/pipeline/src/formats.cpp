@@ -8,8 +8,10 @@
 #include "osteo/dicom/objects.h"
 #include "osteo/dicom/save_series.h"
 #include "osteo/grid/grid_io.h"
+#include "osteo/grid/sampler.h"
 #include "osteo/io/surface_io.h"
 #include "osteo/io/tet_io.h"
+#include "osteo/io/values_io.h"
 #include "osteo/io/volume_io.h"
 #include "osteo/stage/stage.h"
 
@@ -22,14 +24,35 @@ struct Suffixes {
 };
 constexpr std::array<Suffixes, 7> kSuffixes{{{DataKind::image, ".nrrd .nii .nii.gz .mha .vti"},
                                              {DataKind::labels, ".seg.nrrd .nrrd .nii .nii.gz .mha .vti .dcm"},
-                                             {DataKind::grid, ".vdb"},
+                                             {DataKind::grid, ".vdb .nrrd .vti"},
                                              {DataKind::surface, ".ply .stl .obj .glb .3mf .vtp .dcm"},
                                              {DataKind::picture, ".png"},
-                                             {DataKind::document, ".json .inp .svg .csv .tfm"},
+                                             {DataKind::document, ".json .inp .svg .csv .tfm .vtu"},
                                              {DataKind::tets, ".vtu .node .ele"}}};
 
 bool accepts(std::span<const DataKind> kinds, DataKind kind) {
   return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
+// All voxels of the box that holds the stored ones; the others have the background's value.
+Volume<float> dense(const SparseGrid& grid, const Context& context) {
+  constexpr double kMostVoxels = 2e9;
+  const auto& n = grid.frame.dims;
+  if (1.0 * n[0] * n[1] * n[2] > kMostVoxels)
+    throw Error(ExitCode::resources, "the box around the grid has over 2e9 voxels", "write it as .vdb, which is sparse");
+  Volume<float> all;
+  all.frame = grid.frame;
+  const auto values = make_voxels<float>(grid.frame.voxel_count());
+  const GridSampler sampler(grid);
+  std::size_t at = 0;
+  for (int k = 0; k < n[2]; ++k) {
+    context.check_cancelled();
+    for (int j = 0; j < n[1]; ++j) {
+      for (int i = 0; i < n[0]; ++i) values[at++] = sampler.linear_at({1.0 * i, 1.0 * j, 1.0 * k});
+    }
+  }
+  all.voxels = values;
+  return all;
 }
 
 }  // namespace
@@ -126,7 +149,11 @@ void save_data(const Data& data, const fs::path& path, const Context& context, c
       }
       return;
     case DataKind::grid:
-      save_grid(std::get<SparseGrid>(data), path);
+      if (path.extension() == ".vdb") {
+        save_grid(std::get<SparseGrid>(data), path);
+      } else {
+        save_values(dense(std::get<SparseGrid>(data), context), path);
+      }
       return;
     case DataKind::surface:
       if (path.extension() == ".dcm") {

@@ -283,8 +283,8 @@ Vec3 shift_of_shadows(const Levels& from, const Levels& to) {
     for (std::size_t c = 0; c < 3; ++c) reach = std::max(reach, 0.5 * l->frame.dims[c] * l->frame.spacing_mm.x);
   const int n = std::max(8, 2 * static_cast<int>(std::ceil(1.2 * reach / h)));
   const auto shadows = [&](const Level& l, float air) {
-    std::array<Plane, 3> s;
-    for (Plane& p : s) p = {n, n, std::vector<float>(static_cast<std::size_t>(n) * static_cast<std::size_t>(n))};
+    std::array<PlaneImage, 3> s;
+    for (PlaneImage& p : s) p = {n, n, std::vector<float>(static_cast<std::size_t>(n) * static_cast<std::size_t>(n))};
     const IndexMap m = index_map(l.frame, {}, l.frame.centre_mm());
     for (int k = 0; k < n; ++k)
       for (int j = 0; j < n; ++j)

@@ -6,6 +6,7 @@
 
 #include "layout.h"
 #include "osteo/base/param.h"
+#include "plot.h"
 
 namespace osteo {
 namespace {
@@ -14,41 +15,10 @@ using namespace report;
 
 constexpr std::string_view kSignatureBegin = "<!--signature-->", kSignatureEnd = "<!--/signature-->";
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : valid_utf8(text)) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-std::string base64(std::string_view bytes) {
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t v = 0;
-    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
-    for (std::size_t b = 0; b < 3; ++b) v = v << 8 | (b < n ? static_cast<unsigned char>(bytes[i + b]) : 0U);
-    for (std::size_t d = 0; d < 4; ++d) out += d <= n ? kDigits[v >> (18 - 6 * d) & 63] : '=';
-  }
-  return out;
+std::string escaped(std::string_view text) {
+  return html_escaped(text);
 }
 
 std::string from_base64(std::string_view text) {
@@ -183,14 +153,20 @@ struct Writer {
       const double width = i.picture.height > 0 ? height * i.picture.width / i.picture.height : height;
       // In sizes of the text, so that a print made smaller makes the pictures smaller too.
       out << "<figure style=\"width:" << two_digits(width / (kTextPt * kPtMm)) << "rem\"><img id=\"" << escaped(i.id) << "\" alt=\""
-          << escaped(i.caption) << "\" width=\"" << i.picture.width << "\" height=\"" << i.picture.height
-          << "\" src=\"data:image/png;base64," << base64(png_of(i.picture)) << "\">";
+          << escaped(i.caption) << "\" width=\"" << i.picture.width << "\" height=\"" << i.picture.height << "\" src=\""
+          << png_url_of(i.picture) << "\">";
       if (!i.caption.empty()) out << "<figcaption>" << escaped(i.caption) << "</figcaption>";
       out << "</figure>\n";
     }
     out << "</div>\n";
   }
   void operator()(const sheet::Bars& b) const { write_bars(out, b); }
+  void operator()(const sheet::Drawing& d) const {
+    out << "<figure>" << svg_of(d);
+    if (!d.caption.empty()) out << "<figcaption>" << escaped(d.caption) << "</figcaption>";
+    out << "</figure>\n";
+  }
+  void operator()(const sheet::Plot& p) const { out << "<div class=\"plot\">" << svg_of(drawing_of(p, width_mm / kPtMm)) << "</div>\n"; }
   void operator()(const sheet::Signature& s) const { write_signature(out, s); }
   void operator()(const sheet::Columns& c) const {
     double all = 0;
@@ -239,7 +215,7 @@ std::string style_of(double scale) {
        "th,td{padding:.1rem .3rem .1rem 0}tr{break-inside:avoid}\n"
        ".band{display:flex;align-items:baseline;border-left:.28rem solid;padding:.4rem .7rem;margin-bottom:.5rem;break-inside:avoid}\n"
        ".band b{font-size:1.3rem;flex:0 0 20%}\n"
-       ".bars{width:100%;display:block}\n"
+       ".bars,.drawing{width:100%;display:block}.plot{margin-bottom:.4rem;break-inside:avoid}\n"
        ".signature{padding:.5rem .7rem;background:#f1f2f5;height:6.1rem;overflow:hidden;box-sizing:border-box;break-inside:avoid}\n"
        ".signature b{font-size:1.12rem}.fields{display:flex;gap:1rem;align-items:flex-end;height:3.9rem}\n"
        ".by{flex:2}.date{flex:1}.note{flex:3}.line{border-bottom:.05rem solid #666;min-height:1.3em}.fields .quiet{font-size:.8rem}\n"
@@ -275,6 +251,80 @@ void each_tag(std::string_view html, std::string_view opening, const Take& take)
 }
 
 }  // namespace
+
+std::string html_escaped(std::string_view text) {
+  std::string out;
+  for (const char c : valid_utf8(text)) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+std::string base64_of(std::string_view bytes) {
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t v = 0;
+    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+    for (std::size_t b = 0; b < 3; ++b) v = v << 8 | (b < n ? static_cast<unsigned char>(bytes[i + b]) : 0U);
+    for (std::size_t d = 0; d < 4; ++d) out += d <= n ? kDigits[v >> (18 - 6 * d) & 63] : '=';
+  }
+  return out;
+}
+
+std::string png_url_of(const Picture& picture) {
+  return "data:image/png;base64," + base64_of(png_of(picture));
+}
+
+std::string svg_of(const sheet::Drawing& d) {
+  std::ostringstream out;
+  const auto rgb = [](const sheet::Drawing::Colour& c) { return css({c[0] / 255.0, c[1] / 255.0, c[2] / 255.0}); };
+  out << "<svg id=\"" << escaped(d.id) << "\" class=\"drawing\" role=\"img\" aria-label=\"" << escaped(d.alt) << "\" viewBox=\"0 0 "
+      << two_digits(d.width) << ' ' << two_digits(d.height) << "\">\n";
+  for (const auto& mark : d.marks) {
+    if (const auto* const t = std::get_if<sheet::Drawing::Text>(&mark)) {
+      out << "<text x=\"" << two_digits(t->x) << "\" y=\"" << two_digits(t->y) << "\" font-size=\"" << two_digits(t->size) << "\" fill=\""
+          << rgb(t->colour) << '"'
+          << (t->align == 0  ? " text-anchor=\"middle\""
+              : t->align > 0 ? " text-anchor=\"end\""
+                             : "")
+          << (t->bold ? " font-weight=\"bold\"" : "") << '>' << escaped(t->text) << "</text>\n";
+      continue;
+    }
+    if (const auto* const dot = std::get_if<sheet::Drawing::Dot>(&mark)) {
+      out << "<circle cx=\"" << two_digits(dot->x) << "\" cy=\"" << two_digits(dot->y) << "\" r=\"" << two_digits(dot->radius)
+          << "\" fill=\"" << (dot->hollow ? "#fff" : rgb(dot->colour)) << "\" stroke=\"" << rgb(dot->colour)
+          << "\" stroke-width=\"0.7\"/>\n";
+      continue;
+    }
+    const auto& p = std::get<sheet::Drawing::Path>(mark);
+    out << "<path d=\"";
+    for (std::size_t n = 0; n < p.points.size(); ++n)
+      out << (n == 0 ? 'M' : 'L') << two_digits(p.points[n][0]) << ' ' << two_digits(p.points[n][1]);
+    out << (p.fill ? "Z\" fill=\"" + rgb(*p.fill) : std::string("\" fill=\"none")) << '"';
+    if (p.stroke) out << " stroke=\"" << rgb(*p.stroke) << "\" stroke-width=\"" << two_digits(p.width) << "\" stroke-linejoin=\"round\"";
+    if (p.dashed) out << " stroke-dasharray=\"" << two_digits(4 * p.width) << ' ' << two_digits(3 * p.width) << '"';
+    if (p.opacity < 1) out << " opacity=\"" << two_digits(p.opacity) << '"';
+    out << "/>\n";
+  }
+  out << "</svg>\n";
+  return std::move(out).str();
+}
 
 std::string sheet_html(const Sheet& s) {
   const double scale = fitting_scale(s);

@@ -1,14 +1,14 @@
 // The sheet on paper: Pango lays out the text, cairo draws it.
 #include <cairo-pdf.h>
-#include <pango/pangocairo.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <memory>
 
 #include "layout.h"
 #include "osteo/base/error.h"
+#include "osteo/report/cairo_owned.h"
+#include "plot.h"
 
 namespace osteo {
 namespace report {
@@ -17,14 +17,6 @@ namespace {
 constexpr double kMm = 72 / 25.4;                     // points in a millimetre; here all lengths are points
 constexpr double kGap = 1.6 * kMm, kPad = 0.9 * kMm;  // between blocks, columns and pictures; within bands and cells
 constexpr double kSmallest = 0.7;
-
-struct Free {
-  void operator()(cairo_surface_t* s) const { cairo_surface_destroy(s); }
-  void operator()(cairo_t* c) const { cairo_destroy(c); }
-  void operator()(PangoLayout* l) const { g_object_unref(l); }
-};
-template <class T>
-using Owned = std::unique_ptr<T, Free>;
 
 struct Style {
   double pt = kTextPt;
@@ -41,7 +33,7 @@ class Pen {
   bool on = false;
 
   double text(const std::string& what, double x, double y, double width, const Style& style) const {
-    const Owned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
+    const CairoOwned<PangoLayout> layout(pango_cairo_create_layout(cairo_));
     cairo_font_options_t* const options = cairo_font_options_create();
     cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
     cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
@@ -86,11 +78,24 @@ class Pen {
     cairo_line_to(cairo_, x1, y1);
     cairo_stroke(cairo_);
   }
+  void dot(double x, double y, double radius, Rgb c, bool hollow) const {
+    if (!on) return;
+    cairo_new_path(cairo_);
+    cairo_arc(cairo_, x, y, radius, 0, 2 * 3.14159265358979323846);
+    if (hollow) {
+      cairo_set_source_rgb(cairo_, 1, 1, 1);
+      cairo_fill_preserve(cairo_);
+    }
+    cairo_set_source_rgb(cairo_, c.r, c.g, c.b);
+    cairo_set_line_width(cairo_, 0.7);
+    if (!hollow) cairo_fill_preserve(cairo_);
+    cairo_stroke(cairo_);
+  }
   void picture(const Picture& p, double x, double y, double w, double h) const {
     if (!on || p.width == 0) return;
     const std::string png = png_of(p);
     std::string_view rest = png;
-    const Owned<cairo_surface_t> image(cairo_image_surface_create_from_png_stream(
+    const CairoOwned<cairo_surface_t> image(cairo_image_surface_create_from_png_stream(
         [](void* source, unsigned char* to, unsigned n) {
           auto& r = *static_cast<std::string_view*>(source);
           if (r.size() < n) return CAIRO_STATUS_READ_ERROR;
@@ -105,6 +110,51 @@ class Pen {
     cairo_set_source_surface(cairo_, image.get(), 0, 0);
     cairo_paint(cairo_);
     cairo_restore(cairo_);
+  }
+  void drawing(const sheet::Drawing& d, double x, double y, double scale) const {
+    if (!on) return;
+    for (const auto& mark : d.marks) {
+      if (const auto* const t = std::get_if<sheet::Drawing::Text>(&mark)) {
+        // Texts are placed by their baselines: a line of Pango's is as high as ascent and descent together, of which the ascent is 0.8.
+        const double size = t->size * scale, wide = 400;
+        const PangoAlignment align = t->align < 0 ? PANGO_ALIGN_LEFT : t->align == 0 ? PANGO_ALIGN_CENTER : PANGO_ALIGN_RIGHT;
+        const double left = x + t->x * scale - (t->align < 0 ? 0 : t->align == 0 ? wide / 2 : wide);
+        text(t->text, left, y + t->y * scale - 0.905 * size, wide,
+             {size, t->bold, {t->colour[0] / 255.0, t->colour[1] / 255.0, t->colour[2] / 255.0}, align, 1});
+        continue;
+      }
+      if (const auto* const spot = std::get_if<sheet::Drawing::Dot>(&mark)) {
+        const auto& c = spot->colour;
+        dot(x + spot->x * scale, y + spot->y * scale, spot->radius * scale, {c[0] / 255.0, c[1] / 255.0, c[2] / 255.0}, spot->hollow);
+        continue;
+      }
+      const auto& p = std::get<sheet::Drawing::Path>(mark);
+      if (p.points.empty()) continue;
+      cairo_save(cairo_);
+      cairo_translate(cairo_, x, y);
+      cairo_scale(cairo_, scale, scale);
+      cairo_new_path(cairo_);
+      for (const auto& at : p.points) cairo_line_to(cairo_, at[0], at[1]);
+      if (p.fill) {
+        cairo_path_t* const path = cairo_copy_path(cairo_);
+        cairo_close_path(cairo_);
+        const auto& c = *p.fill;
+        cairo_set_source_rgba(cairo_, c[0] / 255.0, c[1] / 255.0, c[2] / 255.0, p.opacity);
+        cairo_fill(cairo_);
+        cairo_append_path(cairo_, path);
+        cairo_path_destroy(path);
+      }
+      if (p.stroke) {
+        const auto& c = *p.stroke;
+        cairo_set_source_rgba(cairo_, c[0] / 255.0, c[1] / 255.0, c[2] / 255.0, p.opacity);
+        cairo_set_line_width(cairo_, p.width);
+        cairo_set_line_join(cairo_, CAIRO_LINE_JOIN_ROUND);
+        const double dash[2] = {4 * p.width, 3 * p.width};
+        cairo_set_dash(cairo_, dash, p.dashed ? 2 : 0, 0);
+        cairo_stroke(cairo_);
+      }
+      cairo_restore(cairo_);
+    }
   }
 
  private:
@@ -247,6 +297,17 @@ double draw(const Pen& pen, const SheetBlock& block, double x, double y, double 
       return real + (caption > 0 ? caption + 1.2 : 0);
     }
     double operator()(const sheet::Bars& b) const { return draw_bars(pen, b, x, y, w); }
+    double operator()(const sheet::Drawing& d) const {
+      const double height = w * d.height / d.width;
+      pen.drawing(d, x, y, w / d.width);
+      if (d.caption.empty()) return height;
+      return height + 1 + pen.text(d.caption, x, y + height + 1, w, {kTextPt - 1.4, false, ink(Tone::quiet)});
+    }
+    double operator()(const sheet::Plot& p) const {
+      const sheet::Drawing d = drawing_of(p, w);
+      pen.drawing(d, x, y, 1);
+      return d.height;
+    }
     double operator()(const sheet::Signature& s) const { return draw_signature(pen, s, x, y, w); }
     double operator()(const sheet::Columns& c) const {
       double all = 0, height = 0, at = x;
@@ -348,8 +409,8 @@ cairo_status_t append(void* sink, const unsigned char* bytes, unsigned n) {
 
 struct Paper {
   std::string bytes;
-  Owned<cairo_surface_t> surface{cairo_pdf_surface_create_for_stream(&append, &bytes, kPageWidth* kMm, kPageHeight* kMm)};
-  Owned<cairo_t> cairo{cairo_create(surface.get())};
+  CairoOwned<cairo_surface_t> surface{cairo_pdf_surface_create_for_stream(&append, &bytes, kPageWidth* kMm, kPageHeight* kMm)};
+  CairoOwned<cairo_t> cairo{cairo_create(surface.get())};
 };
 
 void require_a_font() {

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include "osteo/base/param.h"
 #include "osteo/bone/instrument.h"
 
 namespace osteo {
@@ -80,8 +81,8 @@ void HeatReader::begin(const World& world) {
   bodies_.clear();
   for (const PlacedBody& placed : world.bodies()) bodies_.push_back(body_of(placed));
   std::stable_sort(bodies_.begin(), bodies_.end(), [](const auto& a, const auto& b) { return a->of_region && !b->of_region; });
-  double longest_s = 0.1;
-  for (const auto& b : bodies_) longest_s = std::min(longest_s, 0.6 * b->field->longest_step_s(params_.film_w_per_m2_k));
+  double longest_s = 0.2;
+  for (const auto& b : bodies_) longest_s = std::min(longest_s, b->field->longest_step_s());
   every_ = static_cast<std::uint64_t>(std::max(1.0, std::floor(longest_s * rate_hz_)));
   place_structures();
 }
@@ -256,6 +257,14 @@ double HeatReader::celsius_at(Vec3 world_mm) const {
   return params_.body_c + kelvin;
 }
 
+void HeatReader::for_warm_places(const std::function<void(Vec3 centre_mm, double radius_mm)>& f) const {
+  for (const auto& b : bodies_) {
+    const double radius_mm = 4 * std::numbers::sqrt3 * b->field->cell_mm();
+    for (const Ijk at : b->field->warm_bricks())
+      f(b->world_from_body(b->body_from_cells({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5})), radius_mm);
+  }
+}
+
 std::map<std::uint8_t, HeatReader::OfStructure> HeatReader::structures() const {
   std::map<std::uint8_t, OfStructure> all;
   std::map<std::uint8_t, std::array<std::size_t, 2>> counts;
@@ -296,6 +305,24 @@ std::size_t HeatReader::warm_bricks() const {
   std::size_t sum = 0;
   for (const auto& b : bodies_) sum += b->field->bricks();
   return sum;
+}
+
+std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures) {
+  const auto tenths = [](double x) { return format_number(std::round(x * 10) / 10); };
+  const HeatLedger l = heat.ledger();
+  std::vector<std::string> lines{"warmest bone " + tenths(heat.hottest_c()) + " C; " + tenths(l.added_j) + " J into bone, of which " +
+                                 tenths(l.chips_j) + " left with chips, " + tenths(l.cooled_j) + " into water"};
+  if (structures == nullptr) {
+    lines.emplace_back("the case lists no structures at risk");
+    return lines;
+  }
+  for (const auto& [value, s] : heat.structures()) {
+    const double minutes = s.worst.cem43_min;
+    lines.push_back(structures->name_of(value) + ": " + tenths(s.worst.peak_c) + " C at most, " +
+                    format_number(minutes < 1000 ? std::round(minutes * 100) / 100 : std::round(minutes)) + " min at 43 C" +
+                    (s.worst.coagulated ? ", COAGULATED" : ""));
+  }
+  return lines;
 }
 
 }  // namespace osteo

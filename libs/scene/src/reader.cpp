@@ -1,6 +1,7 @@
 #include "osteo/scene/reader.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace osteo {
@@ -29,13 +30,16 @@ void ReaderHub::tell(const SceneAction& action) {
   for (Reader* const r : readers_) r->action(action);
 }
 
-std::size_t ReaderHub::drain() {
+std::size_t ReaderHub::drain(std::optional<double> about_ms) {
+  // So few that one of them may take its time.
+  const std::size_t at_once = about_ms ? 16 * kMostHands : ticks_.size();
+  const auto begin = std::chrono::steady_clock::now();
   std::size_t total = 0;
   bool lost = false;
   std::size_t due = 0;  // actions whose earlier ticks are in the ring for certain
   for (;;) {
     due = take_actions();
-    const std::size_t n = from_.ticks.pop(ticks_);
+    const std::size_t n = from_.ticks.pop(std::span(ticks_).first(at_once));
     if (n == 0) break;
     // Those of the ticks just taken were published before them.
     take_actions();
@@ -60,6 +64,10 @@ std::size_t ReaderHub::drain() {
       used += changed;
     }
     total += n;
+    if (about_ms && std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count() > *about_ms) {
+      due = 0;  // their ticks may be among those that are left
+      break;
+    }
   }
   due = std::min(due, actions_.size());
   for (std::size_t told = 0; told < due; ++told, actions_.pop_front()) tell(actions_.front());

@@ -48,7 +48,7 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
     recorder_ = std::make_unique<Recorder>(stream_.add_reader(Recorder::kTickCapacity), options_.session_file, header);
   }
   hub_.add(operation_.strokes(), false);
-  readers_ = std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context);
+  readers_ = std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
   readers_->add_to(hub_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (options_.soft) options_.soft->meet(&operation_.world());
@@ -63,11 +63,55 @@ Rehearsal::~Rehearsal() {
 }
 
 bool Rehearsal::running() const {
-  return loop_ && loop_->running();
+  return (loop_ && loop_->running()) || elsewhere_;
 }
 
-std::size_t Rehearsal::drain() {
-  const std::size_t total = hub_.drain();
+TickRecord Rehearsal::latest(std::size_t hand) const {
+  if (seat_now_ == nullptr) return latest_[hand].load();
+  return hand == 0 ? seat_now_->load() : latest_[hand == seat_hand_ ? 0 : hand].load();
+}
+
+void Rehearsal::seat(Device* device, const Seqlock<TickRecord>* now, std::size_t hand) {
+  seat_ = device;
+  seat_now_ = now;
+  seat_hand_ = hand;
+}
+
+// As a replay does: at most one action a tick, the servo's own come by themselves.
+void Rehearsal::step_elsewhere(std::span<const SceneAction> actions) {
+  elsewhere_ = true;
+  for (const SceneAction& a : actions) {
+    if (!row_of(a).by_servo) done_elsewhere_.push_back(a);
+  }
+  {
+    // Until the servo has taken it up: who joins meanwhile finds nothing on its way.
+    std::unique_lock lock(mutex_, std::defer_lock);
+    if (!done_elsewhere_.empty()) {
+      lock.lock();
+      perform(done_elsewhere_.front(), false);
+      done_elsewhere_.pop_front();
+    }
+    operation_.step(0);
+  }
+  if (operation_.ticks() % 16 == 0) catch_up();
+}
+
+void Rehearsal::end_elsewhere(std::span<const SceneAction> behind) {
+  done_elsewhere_.insert(done_elsewhere_.end(), behind.begin(), behind.end());
+  const std::lock_guard lock(queue_mutex_);
+  for (const SceneAction& a : std::exchange(done_elsewhere_, {})) {
+    if (!row_of(a).by_servo) queue_.push_back(a);
+  }
+}
+
+void Rehearsal::catch_up() {
+  if (recorder_) recorder_->drain();
+  const std::lock_guard lock(mutex_);
+  drain();
+}
+
+std::size_t Rehearsal::drain(std::optional<double> about_ms) {
+  const std::size_t total = hub_.drain(about_ms);
   if (total == 0) return 0;
   for (std::size_t hand = 0; hand < devices_.size(); ++hand) latest_[hand].store(hub_.latest(hand));
   if (options_.follow.pieces) pieces_ = static_cast<int>(readers_->large_pieces().size());
@@ -136,6 +180,10 @@ std::optional<SceneAction> Rehearsal::move_soft() {
 
 void Rehearsal::act(const SceneAction& action) {
   const std::lock_guard lock(queue_mutex_);
+  if (elsewhere_) {
+    if (!row_of(action).made_often) refused_ = std::string(name_of(action)) + ": the session runs on another machine, and is changed there";
+    return;
+  }
   const auto same = [&](const SceneAction& before) {
     return before.kind == action.kind && before.body == action.body && before.other == action.other && before.item == action.item &&
            before.hand == action.hand;
@@ -150,6 +198,7 @@ void Rehearsal::act(const SceneAction& action) {
 
 void Rehearsal::note(const std::string& kind, const std::string& json) {
   if (recorder_) recorder_->note({operation_.ticks(), kind, json});
+  if (options_.heard) options_.heard(kind, json);
 }
 
 std::string Rehearsal::take_refusal() {
@@ -184,8 +233,10 @@ void Rehearsal::follow_on() {
   while (!stop_) {
     std::optional<SceneAction> action;
     {
+      // Where it cannot keep up, others get at the scene between two of these all the same.
+      constexpr double kAtOnceMs = 20;
       const std::lock_guard lock(mutex_);
-      drain();
+      drain(kAtOnceMs);
       if (running()) action = move_soft();
     }
     // What is due stays where it is until the servo can take it up, or has ended: finish() does the rest.
@@ -223,6 +274,7 @@ RehearsalSummary Rehearsal::stop() {
   }
   stop_ = true;
   if (thread_.joinable()) thread_.join();
+  elsewhere_ = false;
   return finish();
 }
 

@@ -5,27 +5,11 @@
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/session/apply.h"
 
 namespace osteo {
 
 namespace {
-
-void apply(const SessionPart& part, World& world) {
-  for (const SceneAction& a : part.actions) {
-    if (!row_of(a).by_servo) world.act(a);
-    world.tell(a);
-  }
-  for (const VoxelChange& c : part.changes) {
-    const PlacedBody* const b = world.owner(c.voxel);
-    if (b == nullptr) throw Error(ExitCode::corrupt, "the session changes a voxel that the bone does not have");
-    BrickGrid& bone = b->body->bone;
-    const VoxelKey own = c.voxel - b->body->name_of(0);
-    // The last density of a voxel before each action that parts changes is enough: strokes end there, and what was before is in the bone.
-    const VoxelChange change{c.voxel, c.density, bone.value(own)};
-    bone.set(own, c.density);
-    world.tell({&change, 1});
-  }
-}
 
 // Gives the servo the sample of the tick that is repeated.
 class RecordedHand final : public Device {
@@ -77,7 +61,7 @@ class Replaying {
   void take(const SessionPart& part) {
     if (part.gap != nullptr) end_repeating(*part.gap);
     if (part.gap != nullptr && part.gap == known_until_) changes_apply_ = false;
-    if (changes_apply_) apply(part, from_changes_);
+    if (changes_apply_) apply_part(part, from_changes_);
     result_.actions += part.actions.size();
     if (repeating_) actions_.insert(actions_.end(), part.actions.begin(), part.actions.end());
     // A frame holds whole ticks.
@@ -209,7 +193,7 @@ class Replaying {
     do_all();
     while (const SessionPart* const part = checkpoints_.next()) {
       if (part->checkpoint) break;
-      apply(*part, from_checkpoints_);
+      apply_part(*part, from_checkpoints_);
     }
     const std::string repeated = operation_.world().hash();
     if (repeated != from_changes_.hash()) differ_in_bone();
@@ -242,13 +226,13 @@ class Replaying {
 
 void apply_recorded(const SessionReader& session, World& world) {
   auto parts = session.parts();
-  while (const SessionPart* const part = parts.next()) apply(*part, world);
+  while (const SessionPart* const part = parts.next()) apply_part(*part, world);
 }
 
 std::uint64_t apply_recorded_until(const SessionReader& session, World& world, std::uint64_t tick) {
   std::uint64_t reached = 0;
   auto parts = session.scene_at(tick, reached);
-  while (const SessionPart* const part = parts.next()) apply(*part, world);
+  while (const SessionPart* const part = parts.next()) apply_part(*part, world);
   return reached;
 }
 

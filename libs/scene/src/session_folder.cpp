@@ -29,8 +29,9 @@ ordered_json quantiles(const Histogram& h) {
 
 }  // namespace
 
-SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case_folder, const fs::path& resumed_from) {
-  SessionFolder s{wanted, case_folder, resumed_from, {}};
+SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case_folder, const fs::path& resumed_from,
+                                    const std::string& guided, double resumed_at_s) {
+  SessionFolder s{wanted, case_folder, resumed_from, {}, resumed_at_s, guided};
   if (wanted.empty()) {
     for (int n = 1;; ++n) {
       s.folder = case_folder / "sessions" / std::to_string(n);
@@ -46,6 +47,8 @@ SessionFolder create_session_folder(const fs::path& wanted, const fs::path& case
                 "choose a folder that you may write to");
   ordered_json j{{"osteotome_session_folder", 1}, {"case", relative_to(case_folder, s.folder)}};
   if (!resumed_from.empty()) j["resumed_from"] = relative_to(resumed_from, s.folder);
+  if (resumed_at_s > 0) j["resumed_at_s"] = resumed_at_s;
+  if (!guided.empty()) j["guided"] = guided;
   try {
     const ApprovalNow now = approval_of(case_folder);
     s.approval = now.words();
@@ -62,11 +65,13 @@ SessionFolder open_session_folder(const fs::path& folder, const fs::path& case_f
   require_readable(folder);
   const fs::path file = folder / "session.json";
   if (!fs::exists(file)) throw Error(ExitCode::no_input, "'" + folder.string() + "' is not a session: it has no session.json");
-  SessionFolder s{folder, case_folder, {}, {}};
+  SessionFolder s{folder, case_folder, {}, {}, 0, {}};
   try {
     const auto j = ordered_json::parse(read_text(file));
     if (s.case_folder.empty()) s.case_folder = folder / j.at("case").get<std::string>();
     if (j.contains("approval")) s.approval = j["approval"].at("words").get<std::string>();
+    if (j.contains("resumed_at_s")) s.resumed_at_s = j["resumed_at_s"].get<double>();
+    if (j.contains("guided")) s.guided = j["guided"].get<std::string>();
     if (j.contains("resumed_from")) s.resumed_from = folder / j["resumed_from"].get<std::string>();
   } catch (const nlohmann::json::exception& e) {
     throw Error(ExitCode::corrupt, "'" + file.string() + "' is damaged: " + json_complaint(e));
@@ -83,7 +88,9 @@ World world_of(const Case& the_case, const Anatomy& anatomy) {
 
 World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
   if (session.resumed_from.empty()) return world_of(the_case, anatomy);
-  return world_at_end(open_session_folder(session.resumed_from, session.case_folder), the_case, anatomy, context);
+  const SessionFolder before = open_session_folder(session.resumed_from, session.case_folder);
+  if (session.resumed_at_s > 0) return world_at(before, session.resumed_at_s, the_case, anatomy, context);
+  return world_at_end(before, the_case, anatomy, context);
 }
 
 namespace {
@@ -232,6 +239,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["rate_hz"] = rate_hz;
   j["burr"] = burr;
   j["removed_mm3"] = s.removed_mm3;
+  if (!session.guided.empty()) j["guided"] = session.guided;
   j["hardness"] = hardness_of(anatomy);
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;

@@ -7,7 +7,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/portable_math.h"
-#include "osteo/bone/instrument.h"
+#include "osteo/bone/instrument_gap.h"
 #include "osteo/sound/wav.h"
 
 namespace osteo {
@@ -17,9 +17,10 @@ static_assert(kMostHands == SoundState::kMostVoices);
 
 // How long water takes to fill a cavity, to be sucked off, and to run off by itself: designed for the ear.
 constexpr double kFillS = 1, kSuckS = 1.5, kRunOffS = 20;
-constexpr double kSoftReachMm = 2;          // beneath the burr
-constexpr double kThicknessSmoothS = 0.03;  // a ray that meets a hole for a tick is no thin bone
-constexpr double kAlarmS = 0.4;             // goes on so long behind the last touch, so that a beep is whole
+constexpr double kSoftReachMm = 2;                   // beneath the burr
+constexpr double kThicknessSmoothS = 0.03;           // a ray that meets a hole for a tick is no thin bone
+constexpr double kTouchN = 1, kTouchEveryS = 0.005;  // of two instruments: they do not push each other, so this is designed for the ear
+constexpr double kAlarmS = 0.4;                      // goes on so long behind the last touch, so that a beep is whole
 
 }  // namespace
 
@@ -43,6 +44,24 @@ SoundTracker::SoundTracker(std::set<std::uint32_t> soft, double rate_hz, bool al
 void SoundTracker::take(const SceneAction& action) noexcept {
   if (action.is(ActionKind::suction)) standing_suction_ = action.values[4] > 0;
   if (action.is(ActionKind::irrigate)) standing_water_ = action.values[4] > 0;
+}
+
+// Of any two hands, as of the tick before; looked at every few milliseconds.
+bool SoundTracker::instruments_touch(std::uint64_t tick) noexcept {
+  const auto every = static_cast<std::uint64_t>(std::max(1.0, kTouchEveryS * rate_hz_));
+  if (tick % every != 0) return touching_;
+  touching_ = false;
+  const auto place = [&](std::size_t hand) {
+    const TickRecord& t = last_[hand];
+    return InstrumentPlace{&instrument_of(t.device.tool), from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm),
+                           normalized(from_floats(t.device.axis))};
+  };
+  for (std::size_t a = 0; a < kMostHands; ++a) {
+    for (std::size_t b = a + 1; b < kMostHands; ++b) {
+      if (has_[a] && has_[b] && gap_between(place(a), place(b)).gap_mm < 0) touching_ = true;
+    }
+  }
+  return touching_;
 }
 
 void SoundTracker::take(const TickRecord& record) noexcept {
@@ -91,8 +110,10 @@ void SoundTracker::take(const TickRecord& record) noexcept {
     }
     double& w = state_.water;
     w += (wets ? (1 - w) * dt / kFillS : 0) - (sucks ? w * dt / kSuckS : 0) - w * dt / kRunOffS;
-    state_.metal_n = 0;
+    state_.metal_n = instruments_touch(record.tick) ? kTouchN : 0;
   }
+  last_[record.hand] = record;
+  has_[record.hand] = !plate;
   if (plate) state_.metal_n = std::max(state_.metal_n, static_cast<double>(record.normal_force_n));
   const auto lasts = static_cast<std::uint64_t>(kAlarmS * rate_hz_);
   if ((record.flags & kStructureTouched) != 0) touched_until_ = record.tick + lasts;

@@ -7,6 +7,7 @@
 #include "osteo/base/json.h"
 #include "osteo/bone/hardness.h"
 #include "osteo/data/points_io.h"
+#include "osteo/haptics/texture.h"
 
 namespace osteo {
 namespace {
@@ -61,13 +62,16 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
   require_readable(path);
   const JsonFile file(read_text(path), path.string());
   int version = 0;
-  std::string curve_file, vibration_file, hardness_file;
+  std::string curve_file, vibration_file, hardness_file, texture_file;
+  double texture_mass_kg = kTextureMassKg;
   auto fields = all_fields(setup);
   detail::FieldCollector others;
   others({"osteotome_haptics", "version of the format", "", 1, 1, true}, version);
   others({"hardness_file", "constants of the law of hardness, beside this file"}, hardness_file);
   others({"curve_file", "points of a curve, beside this file"}, curve_file);
   others({"vibration_file", "measured vibration, beside this file"}, vibration_file);
+  others({"texture_file", "what tools feel that slide over bone, beside this file"}, texture_file);
+  others({"texture_mass_kg", "of hand and tool, by which a recorded acceleration is a force", "kg", 0.001, 10}, texture_mass_kg);
   fields.insert(fields.end(), others.fields.begin(), others.fields.end());
   const std::vector<std::string> besides{"tools", "hardness"};
   file.read(file.root(), "", fields, besides);
@@ -94,6 +98,12 @@ void load_haptic_settings(const fs::path& path, HapticSetup& setup) {
     const fs::path beside = path.parent_path() / vibration_file;
     setup.vibration_json = read_text(beside);
     static_cast<void>(parse_vibration(setup.vibration_json, beside.string()));
+  }
+  if (!texture_file.empty()) {
+    const fs::path beside = path.parent_path() / texture_file;
+    // As the session will hold it: what is felt now and in a replay is read from the same text.
+    setup.texture_json = texture_json(load_texture(beside, texture_mass_kg), "a texture file of the case");
+    static_cast<void>(parse_texture(setup.texture_json, beside.string()));
   }
 }
 

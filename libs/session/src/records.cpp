@@ -70,15 +70,16 @@ constexpr std::string_view kByAction = "as the kind of action says";
 constexpr std::array<std::string_view, 12> kValueNames{"value_0", "value_1", "value_2", "value_3", "value_4",  "value_5",
                                                        "value_6", "value_7", "value_8", "value_9", "value_10", "value_11"};
 constexpr auto kActionFields = [] {
-  std::array<RecordField, 5 + kValueNames.size()> f{{
+  std::array<RecordField, 6 + kValueNames.size()> f{{
       {"tick", u64, offsetof(SceneAction, tick), "1", "at whose beginning it happened", input},
       {"action", u32, offsetof(SceneAction, kind), "kind", "a number of the header's actions", input},
       {"piece", u32, offsetof(SceneAction, body), "number, 4294967295: none or all", kByAction, input},
       {"second_piece", u32, offsetof(SceneAction, other), "number, 4294967295: none", kByAction, input},
       {"item", u32, offsetof(SceneAction, item), "plate or fixture, 4294967295: none", kByAction, input},
+      {"hand", u32, offsetof(SceneAction, hand), "number", "whose, from 0; sessions before this field have 0", input},
   }};
   for (std::size_t v = 0; v < kValueNames.size(); ++v)
-    f[5 + v] = nth<SceneAction>(kValueNames[v], f64, offsetof(SceneAction, values), v, "by action", kByAction, input);
+    f[6 + v] = nth<SceneAction>(kValueNames[v], f64, offsetof(SceneAction, values), v, "by action", kByAction, input);
   return f;
 }();
 

@@ -1,8 +1,14 @@
 #include "osteo/stages/mesh.h"
 
+#include <cmath>
+
 #include "osteo/base/error.h"
+#include "osteo/base/guarded.h"
 #include "osteo/base/json_document.h"
+#include "osteo/base/param.h"
+#include "osteo/data/tet_check.h"
 #include "osteo/distance/compare.h"
+#include "osteo/distance/solid.h"
 #include "osteo/distance/voxelize.h"
 #include "osteo/mesh/mesh_info.h"
 #include "osteo/tets/graded_tets.h"
@@ -25,10 +31,82 @@ Error not_built(const std::string& what, const std::string& option) {
 }
 #endif
 
+[[maybe_unused]] constexpr double kMostTets = 5e7;
+
+// Beyond this share of the surface's volume a mesh is another body.
+constexpr double kVolumeOff = 0.05;
+
+void report_volume(double mesh_mm3, double surface_mm3, const Context& context) {
+  context.report("surface_volume_mm3", surface_mm3);
+  const double off = surface_mm3 > 0 ? mesh_mm3 / surface_mm3 - 1 : 0;
+  context.report("volume_off_percent", std::round(1e4 * off) / 100);
+  if (std::abs(off) > kVolumeOff)
+    context.warn("the tetrahedra fill " + format_number(std::round(10 * mesh_mm3) / 10) + " mm3, the surface " +
+                 format_number(std::round(10 * surface_mm3) / 10) + ": " + format_number(std::round(1e3 * off) / 10) +
+                 " %; choose a smaller spacing, or tetgen, which keeps the surface");
+}
+
+double area_of(const TriangleSoup& soup) {
+  double sum = 0;
+  for (const auto& t : soup.triangles) {
+    const Vec3 a = soup.points_mm[t[0]];
+    sum += length(cross(soup.points_mm[t[1]] - a, soup.points_mm[t[2]] - a)) / 2;
+  }
+  return sum;
+}
+
+// What a step of repair did to the body.
+class StepCost {
+ public:
+  StepCost(TriangleSoup before, const Context& context)
+      : before_(std::move(before)), volume_(inside_volume_mm3(before_, context)), context_(context) {}
+  // Reports the step under `name`; true when it takes too much of the body.
+  bool too_dear(const std::string& name, const TriangleSoup& after, bool may_grow) {
+    const double volume = inside_volume_mm3(after, context_), area = area_of(before_);
+    const double off = volume_ > 0 ? volume / volume_ - 1 : 0;
+    const auto percent = [](double share) { return std::round(1e4 * share) / 100; };
+    context_.report(name + "_volume_percent", percent(off));
+    context_.report(name + "_area_percent", percent(area > 0 ? area_of(after) / area - 1 : 0));
+    context_.report(name + "_hausdorff_mm", compare_surfaces(after, before_, context_).hausdorff_mm());
+    said_ = format_number(percent(off)) + " % of the volume";
+    return off < -kMostLost || (!may_grow && off > kMostLost);
+  }
+  [[nodiscard]] const std::string& said() const { return said_; }
+
+ private:
+  static constexpr double kMostLost = 0.03;
+  TriangleSoup before_;
+  double volume_;
+  const Context& context_;
+  std::string said_;
+};
+
 // mesh-repair on plain values.
 TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Context& context) {
   RepairReport r;
-  TriangleSoup soup = repaired(mesh, {p.weld_mm, true, p.min_body_area_mm2, p.keep_largest}, r, context.sub(0, 0.3));
+  RepairOptions options{p.weld_mm, true, p.min_body_area_mm2, p.keep_largest};
+  options.turn_bodies = false;
+  TriangleSoup soup = repaired(mesh, options, r, context.sub(0, 0.1));
+  const auto undo = [&](StepCost& cost, const std::string& step) {
+    if (p.allow_loss) {
+      context.warn(step + " changed " + cost.said() + ", and is kept as --allow-loss asks");
+      return false;
+    }
+    context.warn(step + " would have changed " + cost.said() + " and was undone; --allow-loss keeps it");
+    return true;
+  };
+  RepairReport turned;
+  options.turn_bodies = true;
+  TriangleSoup next = repaired(mesh, options, turned, context.sub(0.1, 0.2));
+  bool keep = true;
+  if (turned.turned_bodies > 0) {
+    StepCost cost(soup, context);
+    keep = !cost.too_dear("turning", next, false) || !undo(cost, "turning bodies round");
+  }
+  if (keep) {
+    soup = std::move(next);
+    r = turned;
+  }
   const auto whole = [](std::uint64_t v) { return static_cast<std::int64_t>(v); };
   context.report("unsound_triangles_dropped", whole(r.unsound));
   context.report("points_welded", whole(r.welded));
@@ -38,11 +116,36 @@ TriangleSoup repair(const TriMesh& mesh, const MeshRepairParams& p, const Contex
   context.report("bodies_turned", whole(r.turned_bodies));
   context.report("bodies_dropped", whole(r.dropped_bodies));
 #ifdef OSTEO_WITH_CGAL
-  if (p.max_hole_edges > 0 || p.self_intersections) {
-    CgalRepairReport c;
-    soup = repaired_by_cgal(soup, p.max_hole_edges, p.self_intersections, c, context.sub(0.3, 1.0));
+  CgalRepairReport c;
+  if (p.max_hole_edges > 0) {
+    next = holes_closed(soup, p.max_hole_edges, c, context.sub(0.3, 0.5));
+    if (c.holes_filled > 0) {
+      StepCost cost(soup, context);
+      if (cost.too_dear("holes", next, true) && undo(cost, "closing holes")) {
+        c.holes_left += c.holes_filled;
+        c.holes_filled = 0;
+      } else {
+        soup = std::move(next);
+      }
+    }
     context.report("holes_filled", whole(c.holes_filled));
     context.report("holes_left", whole(c.holes_left));
+  }
+  if (p.self_intersections) {
+    try {
+      next = intersections_resolved(soup, c, context.sub(0.5, 0.9));
+      if (c.self_intersections_before > 0) {
+        StepCost cost(soup, context);
+        if (cost.too_dear("self_intersections", next, false) && undo(cost, "resolving self-intersections")) {
+          c.self_intersections_after = c.self_intersections_before;
+        } else {
+          soup = std::move(next);
+        }
+      }
+    } catch (const Error& e) {
+      if (e.code() != ExitCode::failed) throw;
+      context.warn(std::string("self-intersections are left as they are: ") + e.what());
+    }
     context.report("self_intersections_before", whole(c.self_intersections_before));
     context.report("self_intersections_after", whole(c.self_intersections_after));
     if (c.self_intersections_after > 0) {
@@ -139,16 +242,18 @@ std::vector<Data> MeshInfoStage::run(const Params& p, std::span<const Data> inpu
 
 StageInfo MeshRepairStage::info() {
   return {.name = "mesh-repair",
-          .version = 1,
+          .version = 2,
           .synopsis = "mends a surface: holes, duplicates, orientation, degenerate triangles, self-intersections",
           .description =
               "Takes out unsound, degenerate and duplicate triangles, joins equal points, makes neighbours and bodies agree on what is "
               "outside, "
-              "closes holes, and cuts out self-intersections where that works. Holes and self-intersections need a build with CGAL. The "
-              "report says what was done and what is left.",
+              "closes holes, and resolves self-intersections: triangles are cut along each other exactly, and what bounds the inside (by "
+              "the winding number) stays. Holes and self-intersections need a build with CGAL. Each step is measured (volume, area, "
+              "Hausdorff distance); one that takes more than 3 % of the volume is undone. The report says what was done and what is left.",
           .inputs = {{"surface", {DataKind::surface}, "triangles"}},
           .outputs = {{"repaired", {DataKind::surface}, "the mended surface"}},
-          .references = {"P. Liepa, Filling Holes in Meshes, SGP 2003", "CGAL 5.5, Polygon Mesh Processing"},
+          .references = {"P. Liepa, Filling Holes in Meshes, SGP 2003", "CGAL 5.5, Polygon Mesh Processing",
+                         "Q. Zhou et al., Mesh Arrangements for Solid Geometry, SIGGRAPH 2016"},
           .example = "osteo mesh-repair scan.stl repaired.ply"};
 }
 
@@ -166,12 +271,15 @@ std::vector<Data> MeshRepairStage::run(const Params& p, std::span<const Data> in
 StageInfo TetrahedralizeStage::info() {
   return {
       .name = "tetrahedralize",
-      .version = 1,
+      .version = 2,
       .synopsis = "tetrahedra that fill a surface",
       .description =
           "Five methods. grid and graded make staircases of perfectly shaped tetrahedra, in no time; grid-conforming follows the surface "
           "with angles that "
-          "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself. Reports a quality table: "
+          "stay good, whatever the surface; tetgen and cgal need a closed surface that does not intersect itself, and run in a process of "
+          "their own. Whatever the "
+          "method, inside is where the winding number is not zero: a shell that faces inward is a cavity, a body within another changes "
+          "nothing, overlaps count once. The volume is held against the surface's, with a warning beyond 5 %. Reports a quality table: "
           "angles, "
           "aspect, volumes, conformity, and the distance of the boundary to the surface.",
       .inputs = {{"surface", {DataKind::surface}, "triangles"}},
@@ -188,6 +296,8 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
   const Frame around = frame_around(soup, p.resolution, 0);
   const double spacing = p.spacing_mm > 0 ? p.spacing_mm : around.spacing_mm.x;
   const Context work = context.sub(p.clean ? 0.2 : 0.0, 0.8);
+  [[maybe_unused]] const GuardLimits limits{p.time_limit_s, p.memory_limit_gb};
+  const double surface_mm3 = inside_volume_mm3(soup, context);
   TetMesh mesh;
   switch (p.method) {
     case TetMethod::grid: {
@@ -197,7 +307,18 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
       break;
     }
     case TetMethod::grid_conforming:
-      mesh = stuffed_tets(soup, {spacing, p.target_dihedral_deg}, work);
+      if (p.keep_thin) {
+        KeptThin kept = stuffed_tets_keeping(soup, {spacing, p.target_dihedral_deg}, surface_mm3, kVolumeOff, 3, work);
+        if (kept.spacing_mm < spacing)
+          context.warn("parts of the surface are too thin for a lattice of " + format_number(spacing) +
+                       " mm: " + format_number(kept.spacing_mm) + " mm was taken; --no-keep-thin keeps the spacing and loses them");
+        context.report("spacing_taken_mm", kept.spacing_mm);
+        context.report("hinges_opened", static_cast<std::int64_t>(kept.hinges));
+        mesh = std::move(kept.mesh);
+      } else {
+        mesh = stuffed_tets(soup, {spacing, p.target_dihedral_deg}, work);
+        context.report("hinges_opened", static_cast<std::int64_t>(open_hinges(mesh)));
+      }
       break;
     case TetMethod::graded:
       mesh = graded_tets(soup, {spacing, p.levels}, work);
@@ -205,27 +326,31 @@ std::vector<Data> TetrahedralizeStage::run(const Params& p, std::span<const Data
     case TetMethod::tetgen:
 #ifdef OSTEO_WITH_TETGEN
       // A regular tetrahedron's volume is 0.118 of its edge's cube.
-      mesh = tets_by_tetgen(soup, {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0}, work);
+      mesh = tets_by_tetgen(
+          soup, {p.max_volume_mm3 > 0 ? p.max_volume_mm3 : 0.118 * spacing * spacing * spacing, 1.414, 0, kMostTets, limits}, work);
       break;
 #else
       throw not_built("TetGen", "OSTEO_TETGEN");
 #endif
     case TetMethod::cgal:
 #ifdef OSTEO_WITH_CGAL
-      mesh = tets_by_cgal(soup, {spacing, 0, p.surface_spacing_mm, true}, work);
+      mesh = tets_by_cgal(soup, {spacing, 0, p.surface_spacing_mm, true, kMostTets, limits}, work);
       break;
 #else
       throw not_built("CGAL", "OSTEO_CGAL");
 #endif
   }
   context.progress(0.8, "checking");
-  report_quality(tet_quality(mesh, context), context);
+  const TetQuality quality = tet_quality(mesh, context);
+  report_quality(quality, context);
+  report_volume(quality.volume_mm3, surface_mm3, context);
   const SurfaceComparison c = compare_surfaces(soup_of(boundary_of(mesh)), soup, context.sub(0.9, 1.0));
   context.report("boundary_to_surface_mean_mm", c.a_to_b.mean_mm);
   context.report("boundary_to_surface_max_mm", c.a_to_b.max_mm);
   context.report("surface_to_boundary_mean_mm", c.b_to_a.mean_mm);
   context.report("surface_to_boundary_max_mm", c.b_to_a.max_mm);
   context.progress(1.0);
+  require_sound(mesh);
   return {std::make_shared<const TetMesh>(std::move(mesh))};
 }
 

@@ -35,6 +35,16 @@ double fisher_f_quantile(double share, double df1, double df2) {
   return bm::quantile(bm::fisher_f(df1, df2), share);
 }
 
+double fisher_f_p(double f, double df1, double df2) {
+  return bm::cdf(bm::complement(bm::fisher_f(df1, df2), f));
+}
+double student_beyond(double critical, double df, double non_centrality) {
+  // So far out Boost's series do not end, and nothing is left on this side.
+  if (std::abs(non_centrality) > 37 + critical) return 1;
+  const bm::non_central_t t(df, non_centrality);
+  return bm::cdf(bm::complement(t, critical)) + bm::cdf(t, -critical);
+}
+
 double non_centrality(double t, double df, double share) try {
   // The share below t falls as the non-centrality rises; beyond some forty of them off there is nothing left of it.
   const auto off = [&](double d) { return bm::cdf(bm::non_central_t(df, d), t) - share; };

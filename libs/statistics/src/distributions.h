@@ -10,6 +10,10 @@ namespace osteo::statistics {
 [[nodiscard]] double student_quantile(double share, double df);
 [[nodiscard]] double chi_squared_quantile(double share, double df);
 [[nodiscard]] double fisher_f_quantile(double share, double df1, double df2);
+/// The upper tail.
+[[nodiscard]] double fisher_f_p(double f, double df1, double df2);
+/// The share of the non-central t distribution beyond `critical` on either side.
+[[nodiscard]] double student_beyond(double critical, double df, double non_centrality);
 /// The non-centrality for which `share` of the non-central t distribution lies below t. NaN where it cannot be found.
 [[nodiscard]] double non_centrality(double t, double df, double share);
 /// Gamma(df / 2) / (sqrt(df / 2) Gamma((df - 1) / 2)): Hedges' factor. df > 1.

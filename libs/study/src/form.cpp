@@ -94,18 +94,22 @@ std::string study_id(const Plan& plan) {
   return hash_text(plan.title + "\n" + std::to_string(plan.seed)).substr(0, 8);
 }
 
-std::string form_html(const Study& study, const std::string& rater) {
-  need_code(rater, "the rater");
-  if (study.sessions.empty())
-    throw Error(ExitCode::no_input, "the study has no sessions to rate", "add them with: osteo study add STUDY metrics.json");
+std::vector<std::string> rating_order(const Study& study, const std::string& rater) {
   std::vector<std::string> blinds;
   for (const Session& s : study.sessions) blinds.push_back(s.blind);
   statistics::Random random(std::stoull(hash_text(std::to_string(study.plan.seed) + "\nform\n" + rater).substr(0, 16), nullptr, 16));
   random.shuffle(blinds);
+  return blinds;
+}
+
+std::string form_html(const Study& study, const std::string& rater) {
+  need_code(rater, "the rater");
+  if (study.sessions.empty())
+    throw Error(ExitCode::no_input, "the study has no sessions to rate", "add them with: osteo study add STUDY metrics.json");
   const Json values{{"title", study.plan.title.empty() ? "Study" : study.plan.title},
                     {"id", study_id(study.plan)},
                     {"rater", rater},
-                    {"sessions", Json(blinds)},
+                    {"sessions", Json(rating_order(study, rater))},
                     {"items", Json(study.plan.items)},
                     {"lowest", study.plan.lowest},
                     {"highest", study.plan.highest}};

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "csv.h"
+#include "osteo/base/csv.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json.h"
 #include "osteo/base/json_document.h"
@@ -15,7 +15,7 @@ namespace osteo::study {
 namespace {
 
 const std::vector<std::string> kPlanKeys{"osteotome_study", "title", "procedure", "groups",  "competent", "cases",
-                                         "attempts",        "items", "lowest",    "highest", "seed"};
+                                         "attempts",        "items", "lowest",    "highest", "seed",      "simulated"};
 const std::vector<std::string> kSessionColumns{"blind", "participant", "case", "attempt"};
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
@@ -28,17 +28,9 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 Json plan_json(const Plan& p) {
-  return Json{{"osteotome_study", 1},
-              {"title", p.title},
-              {"procedure", p.procedure},
-              {"groups", Json(p.groups)},
-              {"competent", p.competent},
-              {"cases", Json(p.cases)},
-              {"attempts", p.attempts},
-              {"items", Json(p.items)},
-              {"lowest", p.lowest},
-              {"highest", p.highest},
-              {"seed", p.seed}};
+  return Json{{"osteotome_study", 1},     {"title", p.title},       {"procedure", p.procedure}, {"groups", Json(p.groups)},
+              {"competent", p.competent}, {"cases", Json(p.cases)}, {"attempts", p.attempts},   {"items", Json(p.items)},
+              {"lowest", p.lowest},       {"highest", p.highest},   {"seed", p.seed},           {"simulated", p.simulated}};
 }
 
 // What holds of a plan wherever it comes from; empty when all is well.
@@ -86,6 +78,7 @@ Plan read_plan(const fs::path& file) {
   p.lowest = static_cast<int>(std::clamp(whole("lowest", 1), -1e6, 1e6));
   p.highest = static_cast<int>(std::clamp(whole("highest", 5), -1e6, 1e6));
   p.seed = static_cast<std::uint64_t>(std::max(0.0, whole("seed", 1)));
+  if (const JsonValue* v = root.find("simulated")) json.read(*v, "", FieldRef{{"simulated", ""}, &p.simulated});
   if (const std::string what = wrong_with(p); !what.empty()) throw json.wrong(root, what);
   return p;
 }

@@ -3,30 +3,54 @@
 #define TETLIBRARY
 #include <tetgen.h>
 
+#include <cmath>
+#include <cstring>
+#include <map>
 #include <string>
 
 #include "osteo/base/error.h"
 #include "osteo/base/param.h"
+#include "osteo/distance/solid.h"
+#include "osteo/distance/voxelize.h"
 
 namespace osteo {
+namespace {
 
-TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options, const Context& context) {
-  const Ordered used = ordered(surface, context);
-  const std::string advice = "try 'osteo mesh-repair' first, or the method grid-conforming, which takes any surface";
-  if (!used.open.empty()) {
-    throw Error(ExitCode::failed, "TetGen needs a closed surface; " + std::to_string(used.open.size()) + " edges of this one are open",
-                advice);
-  }
-  tetgenio in, out;
+const char* const kAdvice = "try 'osteo mesh-repair' first (--clean does), or the method grid-conforming, which takes any surface";
+
+// What TetGen makes: the child's answer, as bytes.
+struct Made {
+  std::vector<Vec3> points;
+  std::vector<std::array<std::uint32_t, 4>> tets;
+  std::vector<double> region;  // of each tetrahedron
+};
+
+template <class T>
+void put(std::string& bytes, const std::vector<T>& list) {
+  const std::uint64_t n = list.size();
+  bytes.append(reinterpret_cast<const char*>(&n), sizeof n);
+  bytes.append(reinterpret_cast<const char*>(list.data()), n * sizeof(T));
+}
+template <class T>
+void get(const std::string& bytes, std::size_t& at, std::vector<T>& list) {
+  std::uint64_t n = 0;
+  std::memcpy(&n, bytes.data() + at, sizeof n);
+  at += sizeof n;
+  list.resize(n);
+  std::memcpy(static_cast<void*>(list.data()), bytes.data() + at, n * sizeof(T));
+  at += n * sizeof(T);
+}
+
+void fill(tetgenio& in, const TriangleSoup& soup) {
   in.firstnumber = 0;
-  in.numberofpoints = static_cast<int>(used.soup.points_mm.size());
-  in.pointlist = new REAL[used.soup.points_mm.size() * 3];
-  for (std::size_t i = 0; i < used.soup.points_mm.size(); ++i) {
-    for (std::size_t a = 0; a < 3; ++a) in.pointlist[3 * i + a] = used.soup.points_mm[i][a];
+  in.numberofpoints = static_cast<int>(soup.points_mm.size());
+  in.pointlist = new REAL[soup.points_mm.size() * 3];
+  for (std::size_t i = 0; i < soup.points_mm.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a) in.pointlist[3 * i + a] = soup.points_mm[i][a];
   }
-  in.numberoffacets = static_cast<int>(used.soup.triangles.size());
-  in.facetlist = new tetgenio::facet[used.soup.triangles.size()];
-  for (std::size_t i = 0; i < used.soup.triangles.size(); ++i) {
+  in.numberoffacets = static_cast<int>(soup.triangles.size());
+  in.facetlist = new tetgenio::facet[soup.triangles.size()];
+  for (std::size_t i = 0; i < soup.triangles.size(); ++i) {
     tetgenio::facet& f = in.facetlist[i];
     tetgenio::init(&f);
     f.numberofpolygons = 1;
@@ -34,27 +58,35 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
     tetgenio::init(&f.polygonlist[0]);
     f.polygonlist[0].numberofvertices = 3;
     f.polygonlist[0].vertexlist = new int[3];
-    for (std::size_t k = 0; k < 3; ++k) f.polygonlist[0].vertexlist[k] = static_cast<int>(used.soup.triangles[i][k]);
+    for (std::size_t k = 0; k < 3; ++k) f.polygonlist[0].vertexlist[k] = static_cast<int>(soup.triangles[i][k]);
   }
-  context.progress(0.1, "looking for triangles that cross");
+}
+
+// First, since TetGen 1.5.0 ends the program, or fills anything, when it meets them while meshing.
+std::string crossings(const TriangleSoup& soup) {
+  tetgenio in, crossing;
+  fill(in, soup);
   try {
-    // First, since TetGen 1.5.0 ends the program when it meets them while meshing.
-    tetgenio crossing;
     char detect[] = "dQ";
     tetrahedralize(detect, &in, &crossing);
-    if (crossing.numberoftrifaces > 0)
-      throw Error(ExitCode::failed,
-                  "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) +
-                      " triangles of this one do",
-                  advice);
   } catch (const int code) {
     throw Error(ExitCode::failed, "TetGen cannot tell whether the surface intersects itself (its code " + std::to_string(code) + ")",
-                advice);
+                kAdvice);
   }
-  std::string switches = "pQq" + format_number(options.radius_edge_ratio);
+  if (crossing.numberoftrifaces > 0)
+    throw Error(
+        ExitCode::failed,
+        "TetGen needs a surface that does not intersect itself; " + std::to_string(crossing.numberoftrifaces) + " triangles of this one do",
+        kAdvice);
+  return {};
+}
+
+std::string mesh(const TriangleSoup& soup, const TetgenOptions& options) {
+  tetgenio in, out;
+  fill(in, soup);
+  std::string switches = "pAQq" + format_number(options.radius_edge_ratio);
   if (options.min_dihedral_deg > 0) switches += "/" + format_number(options.min_dihedral_deg);
   if (options.max_volume_mm3 > 0) switches += "a" + format_number(options.max_volume_mm3);
-  context.progress(0.2, "meshing");
   try {
     tetrahedralize(switches.data(), &in, &out);
   } catch (const int code) {
@@ -64,24 +96,103 @@ TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options
                                : code == 5  ? "two triangles are nearly coplanar"
                                : code == 10 ? "an input error"
                                             : "an internal error";
-    throw Error(ExitCode::failed, std::string("TetGen failed: ") + reason + " (its code " + std::to_string(code) + ")", advice);
+    throw Error(code == 1 ? ExitCode::resources : ExitCode::failed,
+                std::string("TetGen failed: ") + reason + " (its code " + std::to_string(code) + ")", kAdvice);
   }
-  TetMesh mesh;
-  for (int i = 0; i < out.numberofpoints; ++i) {
-    mesh.points_mm.push_back({static_cast<float>(out.pointlist[3 * i]), static_cast<float>(out.pointlist[3 * i + 1]),
-                              static_cast<float>(out.pointlist[3 * i + 2])});
-  }
+  Made made;
+  for (int i = 0; i < out.numberofpoints; ++i)
+    made.points.push_back({out.pointlist[3 * i], out.pointlist[3 * i + 1], out.pointlist[3 * i + 2]});
   for (int i = 0; i < out.numberoftetrahedra; ++i) {
     const int* v = out.tetrahedronlist + static_cast<std::ptrdiff_t>(i) * out.numberofcorners;
-    std::array<std::uint32_t, 4> t{static_cast<std::uint32_t>(v[0]), static_cast<std::uint32_t>(v[1]), static_cast<std::uint32_t>(v[2]),
-                                   static_cast<std::uint32_t>(v[3])};
-    const auto p = [&](std::size_t k) { return Vec3{mesh.points_mm[t[k]][0], mesh.points_mm[t[k]][1], mesh.points_mm[t[k]][2]}; };
-    if (dot(cross(p(1) - p(0), p(2) - p(0)), p(3) - p(0)) < 0) std::swap(t[2], t[3]);
-    mesh.tets.push_back(t);
+    made.tets.push_back({static_cast<std::uint32_t>(v[0]), static_cast<std::uint32_t>(v[1]), static_cast<std::uint32_t>(v[2]),
+                         static_cast<std::uint32_t>(v[3])});
+    made.region.push_back(out.numberoftetrahedronattributes > 0
+                              ? out.tetrahedronattributelist[static_cast<std::ptrdiff_t>(i) * out.numberoftetrahedronattributes]
+                              : 0);
   }
-  if (mesh.tets.empty()) throw Error(ExitCode::failed, "TetGen made no tetrahedra", advice);
+  std::string bytes;
+  put(bytes, made.points);
+  put(bytes, made.tets);
+  put(bytes, made.region);
+  return bytes;
+}
+
+double volume_of(const Made& m, const std::array<std::uint32_t, 4>& t) {
+  const Vec3 o = m.points[t[0]];
+  return dot(cross(m.points[t[1]] - o, m.points[t[2]] - o), m.points[t[3]] - o) / 6;
+}
+
+}  // namespace
+
+TetMesh tets_by_tetgen(const TriangleSoup& surface, const TetgenOptions& options, const Context& context) {
+  const Ordered order = ordered(surface, context);
+  if (const TriangleSoup whole = welded(surface); !is_closed(whole) && !order.open.empty()) {
+    throw Error(ExitCode::failed, "TetGen needs a closed surface; " + std::to_string(order.open.size()) + " edges of this one are open",
+                kAdvice);
+  }
+  // Before anything is left out: of surfaces that cross no patch lies wholly inside or outside.
+  context.progress(0.1, "looking for triangles that cross");
+  const TriangleSoup together = compacted(order.soup);
+  static_cast<void>(run_guarded(
+      "TetGen", kAdvice, options.limits, [&] { return crossings(together); }, context));
+  const TriangleSoup solid = compacted(solid_surface(surface, context).soup);
+  const double volume = inside_volume_mm3(solid, context);
+  if (options.max_volume_mm3 > 0) {
+    const double expected = volume / options.max_volume_mm3;
+    if (!(expected < options.most_tets))
+      throw Error(ExitCode::resources,
+                  "TetGen would make over " + format_number(expected) + " tetrahedra of at most " + format_number(options.max_volume_mm3) +
+                      " mm3, more than the " + format_number(options.most_tets) + " that are allowed",
+                  "choose a larger spacing, or larger --max-volume-mm3");
+  }
+  context.progress(0.2, "meshing");
+  const std::string bytes = run_guarded(
+      "TetGen", kAdvice, options.limits, [&] { return mesh(solid, options); }, context);
+  Made made;
+  std::size_t at = 0;
+  get(bytes, at, made.points);
+  get(bytes, at, made.tets);
+  get(bytes, at, made.region);
+  // TetGen fills all that is enclosed. A region of it is bounded by the surface, so one place in it tells whether it is inside.
+  std::map<double, std::pair<std::size_t, double>> largest;
+  for (std::size_t t = 0; t < made.tets.size(); ++t) {
+    const double v = std::abs(volume_of(made, made.tets[t]));
+    const auto [found, fresh] = largest.try_emplace(made.region[t], t, v);
+    if (!fresh && v > found->second.second) found->second = {t, v};
+  }
+  std::map<double, bool> inside;
+  for (const auto& [region, found] : largest) {
+    Vec3 middle{};
+    for (const std::uint32_t p : made.tets[found.first]) middle += made.points[p] / 4;
+    inside[region] = std::abs(winding_number(solid, middle)) > 0.5;
+  }
+  constexpr std::uint32_t kUnused = 0xffffffffU;
+  std::vector<std::uint32_t> place(made.points.size(), kUnused);
+  TetMesh result;
+  double filled = 0;
+  for (std::size_t t = 0; t < made.tets.size(); ++t) {
+    if (!inside[made.region[t]]) continue;
+    std::array<std::uint32_t, 4> v = made.tets[t];
+    const double own = volume_of(made, v);
+    if (own < 0) std::swap(v[2], v[3]);
+    filled += std::abs(own);
+    for (std::uint32_t& p : v) {
+      if (place[p] == kUnused) {
+        place[p] = static_cast<std::uint32_t>(result.points_mm.size());
+        result.points_mm.push_back(to_floats(made.points[p]));
+      }
+      p = place[p];
+    }
+    result.tets.push_back(v);
+  }
+  if (result.tets.empty()) throw Error(ExitCode::failed, "TetGen made no tetrahedra", kAdvice);
+  // It keeps the surface, so the volume is the surface's, or something went wrong without a word.
+  if (!(std::abs(filled - volume) <= 0.001 * volume))
+    throw Error(ExitCode::failed,
+                "TetGen's tetrahedra fill " + format_number(filled) + " mm3 of a surface that holds " + format_number(volume) + " mm3",
+                kAdvice);
   context.progress(1.0);
-  return mesh;
+  return result;
 }
 
 }  // namespace osteo

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <unordered_map>
 
 #include "improve.h"
 #include "osteo/base/error.h"
+#include "osteo/base/union_find.h"
 #include "osteo/distance/distance_map.h"
 
 namespace osteo {
@@ -338,6 +340,85 @@ TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options
   if (options.target_dihedral_deg > 0) improve_tets(mesh, surface, options.target_dihedral_deg, options.spacing_mm, context.sub(0.9, 1.0));
   context.progress(1.0);
   return mesh;
+}
+
+std::uint64_t open_hinges(TetMesh& mesh) {
+  // Tetrahedra of each point; two of them belong together when they share a face at it.
+  std::vector<std::uint32_t> first(mesh.points_mm.size() + 1, 0);
+  for (const auto& t : mesh.tets) {
+    for (const auto v : t) ++first[v + 1];
+  }
+  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+  std::vector<std::uint32_t> around(mesh.tets.size() * 4), fill(first.begin(), first.end() - 1);
+  for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+    for (const auto v : mesh.tets[t]) around[fill[v]++] = t;
+  }
+  struct Side {
+    std::uint32_t a, b, local;  // the face's other two points; which of the point's tetrahedra
+  };
+  std::vector<Side> sides;
+  std::vector<std::uint32_t> parent;
+  std::vector<std::array<std::uint32_t, 3>> changes;  // tetrahedron, old point, new point
+  std::uint64_t made = 0;
+  const std::size_t points = mesh.points_mm.size();
+  for (std::uint32_t v = 0; v < points; ++v) {
+    const std::uint32_t n = first[v + 1] - first[v];
+    sides.clear();
+    parent.resize(n);
+    std::iota(parent.begin(), parent.end(), 0U);
+    for (std::uint32_t k = 0; k < n; ++k) {
+      std::array<std::uint32_t, 3> other{};
+      std::size_t c = 0;
+      for (const auto w : mesh.tets[around[first[v] + k]]) {
+        if (w != v) other[c++] = w;
+      }
+      std::sort(other.begin(), other.end());
+      sides.push_back({other[0], other[1], k});
+      sides.push_back({other[0], other[2], k});
+      sides.push_back({other[1], other[2], k});
+    }
+    std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+    for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+      if (sides[i].a == sides[i + 1].a && sides[i].b == sides[i + 1].b) join_sets(parent, sides[i].local, sides[i + 1].local);
+    }
+    const std::uint32_t stays = n > 0 ? root_of(parent, 0) : 0;
+    std::unordered_map<std::uint32_t, std::uint32_t> own;
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const std::uint32_t r = root_of(parent, k);
+      if (r == stays) continue;
+      const auto [at, fresh] = own.try_emplace(r, static_cast<std::uint32_t>(mesh.points_mm.size()));
+      if (fresh) {
+        const auto place = mesh.points_mm[v];
+        mesh.points_mm.push_back(place);
+        ++made;
+      }
+      changes.push_back({around[first[v] + k], v, at->second});
+    }
+  }
+  for (const auto& [t, from, to] : changes) std::replace(mesh.tets[t].begin(), mesh.tets[t].end(), from, to);
+  return made;
+}
+
+KeptThin stuffed_tets_keeping(const TriangleSoup& surface, const StuffingOptions& options, double volume, double most_lost, int halvings,
+                              const Context& context) {
+  KeptThin best;
+  StuffingOptions now = options;
+  for (int halving = 0;; ++halving) {
+    try {
+      TetMesh mesh = stuffed_tets(surface, now, context);
+      best = {std::move(mesh), now.spacing_mm, 0};
+    } catch (const Error& e) {
+      // Nothing inside at that spacing: a finer one may find it.
+      if (e.code() != ExitCode::failed || halving >= halvings) throw;
+    }
+    const double got = best.mesh.tets.empty() ? 0 : volume_mm3(best.mesh);
+    now.spacing_mm /= 2;
+    const Frame next = frame_around_mm(surface, now.spacing_mm / 2, 3);
+    const bool fits = 0.25 * static_cast<double>(next.dims[0]) * next.dims[1] * next.dims[2] < 4e7;
+    if (got >= (1 - most_lost) * volume || halving >= halvings || (!fits && !best.mesh.tets.empty())) break;
+  }
+  best.hinges = open_hinges(best.mesh);
+  return best;
 }
 
 }  // namespace osteo

@@ -112,6 +112,7 @@ void TissueDynamics<Real>::Impl::rows(bool edges, const At& place, std::vector<d
 // Limit of the step: 2 / omega, omega^2 <= max over points of row / m (Gershgorin).
 template <class Real>
 double TissueDynamics<Real>::Impl::certify() {
+  if (is_factorised()) return options.factorised_step_s;
   edge_row.assign(x.size(), 0);
   const auto at_rest = [&](std::uint32_t p) { return model.rest()[p]; };
   rows(true, at_rest, edge_row);
@@ -161,6 +162,8 @@ TissueDynamics<Real>::TissueDynamics(const TissueModel& model, std::span<const s
     : impl_(std::make_unique<Impl>(model, options)) {
   Impl& m = *impl_;
   if (!(options.density_kg_m3 > 0)) throw Error(ExitCode::usage, "tissue needs a density above 0");
+  if (!(options.factorised_step_s >= 0) || options.iterations < 1)
+    throw Error(ExitCode::usage, "factorised steps need a length above 0 and at least one iteration");
   const std::size_t n = model.point_count();
   m.fixed.assign(n, false);
   for (const std::uint32_t p : fixed) {
@@ -271,7 +274,8 @@ template <class Real>
 Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
   Vec3 on_tool{};
-  for (int s = 0; s < steps; ++s) {
+  for (int s = 0; s < steps && m.is_factorised(); ++s) on_tool = m.step_factorised();
+  for (int s = 0; s < steps && !m.is_factorised(); ++s) {
     if (++m.since_certified >= kCertifySteps) {
       m.since_certified = 0;
       m.certify_again();

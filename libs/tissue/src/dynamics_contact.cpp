@@ -24,6 +24,7 @@ void TissueDynamics<Real>::set_obstacle(RigidContact obstacle) {
   m.ties.clear();
   m.tied.assign(m.x.size(), false);
   m.steps = 0;
+  m.factorised.reset();
   if (!m.obstacle.shape) return;
   m.ties = points_inside(*m.obstacle.shape, m.model.rest(), m.surface);
   for (const std::uint32_t p : m.ties) m.tied[p] = true;

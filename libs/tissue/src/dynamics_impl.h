@@ -47,7 +47,16 @@ struct TissueDynamics<Real>::Impl {
   int met = 0;
   Counts counts;
 
+  // Of factorised steps (dynamics_factorised.cpp), once there was one.
+  struct Factorised;
+  std::shared_ptr<Factorised> factorised;
+
   Impl(const TissueModel& m, const DynamicsOptions& o) : model(m), options(o) {}
+  [[nodiscard]] bool is_factorised() const { return options.factorised_step_s > 0; }
+  [[nodiscard]] double inertia(std::uint32_t p) const;
+  void factorise();
+  Vec3 gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient);
+  Vec3 step_factorised();
   void lay_out();
   double certify();
   void certify_again();
@@ -56,6 +65,7 @@ struct TissueDynamics<Real>::Impl {
   Vec3 forces();
   // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
   [[nodiscard]] double room(std::uint32_t p) const {
+    if (is_factorised()) return INFINITY;
     return 0.45 * (4 - 4 * options.step_share * options.step_share) * mass[p] / (dt * dt);
   }
   double stiffness(const RigidContact& by, double most);

@@ -111,6 +111,13 @@ void TissueLoad::add_on_face(const std::array<std::uint32_t, 3>& corners, Vec3 f
   }
 }
 
+void TissueLoad::add_in_tet(const std::array<std::uint32_t, 4>& corners, Vec3 force_n) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    forces_n.push_back({corners[i], force_n / 4});
+    for (std::size_t j = i + 1; j < 4; ++j) edge_forces_n.push_back({{corners[i], corners[j]}, force_n / 5});
+  }
+}
+
 struct EquilibriumSolver::Impl {
   std::vector<std::uint32_t> number;  // of a point among those that move
   std::size_t moving = 0;
@@ -234,16 +241,19 @@ void EquilibriumSolver::Impl::assemble(const Energy& energy, std::span<const Vec
   }
 }
 
-EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, const TissueLoad& held)
-    : EquilibriumSolver(energy, rest, held.fixed, held.sliders) {}
+namespace {
 
-EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
-                                     std::span<const Slider> sliders)
-    : impl_(std::make_unique<Impl>()) {
+struct Held {
+  std::vector<std::uint8_t> axes;  // of each point that do not move
+  std::vector<bool> used;          // by an element
+};
+
+// Parts that hang together must each be held.
+Held held_of(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed, std::span<const Slider> sliders) {
   const std::size_t points = energy.point_count();
   if (rest.size() != points) throw Error(ExitCode::usage, "the rest shape has another number of points than the model");
-  std::vector<std::uint8_t>& held = impl_->held;
-  held.assign(points, 0);
+  Held result{std::vector<std::uint8_t>(points), std::vector<bool>(points)};
+  auto& [held, used] = result;
   const auto hold = [&](std::uint32_t p, std::uint8_t axes) {
     if (p >= points)
       throw Error(ExitCode::usage, "point " + std::to_string(p) + " is to be fixed, but there are only " + std::to_string(points));
@@ -251,8 +261,7 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
   };
   for (const std::uint32_t p : fixed) hold(p, kAllAxes);
   for (const Slider& s : sliders) hold(s.point, s.held);
-  // Parts that hang together: each must be held. An element of one point holds it in place.
-  std::vector<bool> used(points), anchored(points);
+  std::vector<bool> anchored(points);
   std::vector<std::uint32_t> parent(points);
   std::iota(parent.begin(), parent.end(), 0U);
   for (std::size_t e = 0; e < energy.element_count(); ++e) {
@@ -278,6 +287,31 @@ EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3>
                   "fix at least three of its points that do not lie in a line, or leave the part out");
     }
   }
+  return result;
+}
+
+std::vector<Slider> sliders_of(const TissueLoad& load) {
+  std::vector<Slider> all = load.sliders;
+  for (const TissueLoad::Moved& m : load.moved) all.push_back({m.point, m.held});
+  return all;
+}
+
+}  // namespace
+
+void require_held(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed, std::span<const Slider> sliders) {
+  static_cast<void>(held_of(energy, rest, fixed, sliders));
+}
+
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, const TissueLoad& held)
+    : EquilibriumSolver(energy, rest, held.fixed, sliders_of(held)) {}
+
+EquilibriumSolver::EquilibriumSolver(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed,
+                                     std::span<const Slider> sliders)
+    : impl_(std::make_unique<Impl>()) {
+  const std::size_t points = energy.point_count();
+  const auto [axes, used] = held_of(energy, rest, fixed, sliders);
+  std::vector<std::uint8_t>& held = impl_->held;
+  held = axes;
   impl_->number.assign(points, kFixed);
   for (std::uint32_t p = 0; p < points; ++p) {
     if (used[p] && held[p] != kAllAxes) impl_->number[p] = static_cast<std::uint32_t>(impl_->moving++);

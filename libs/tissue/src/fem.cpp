@@ -257,12 +257,27 @@ TissueLoad FemBody::on_all_points(const TissueLoad& load) const {
   };
   for (const std::uint32_t p : load.fixed) hold(p, 7);
   for (const Slider& s : load.sliders) hold(s.point, s.held);
+  std::map<std::uint32_t, std::pair<std::uint8_t, Vec3>> moved;
+  for (const TissueLoad::Moved& m : load.moved) {
+    hold(m.point, m.held);
+    auto& [axes, by] = moved[m.point];
+    axes = static_cast<std::uint8_t>(axes | m.held);
+    for (std::size_t a = 0; a < 3; ++a) by[a] = (m.held >> a & 1) != 0 ? m.by_mm[a] : by[a];
+  }
+  const auto of = [&](std::uint32_t p) {
+    const auto found = moved.find(p);
+    return found != moved.end() ? found->second : std::pair<std::uint8_t, Vec3>{};
+  };
   std::map<std::array<std::uint32_t, 2>, std::uint32_t> middle;
   for (std::size_t m = 0; m < middle_of_.size(); ++m) {
     const auto [a, b] = middle_of_[m];
     const auto point = static_cast<std::uint32_t>(corners_ + m);
     const auto both = static_cast<std::uint8_t>(held[a] & held[b]);
-    if (both != 0 && both != 7) all.sliders.push_back({point, both});
+    const auto [axes_a, by_a] = of(a);
+    const auto [axes_b, by_b] = of(b);
+    const auto goes = static_cast<std::uint8_t>(both & (axes_a | axes_b)), stays = static_cast<std::uint8_t>(both & ~goes);
+    if (goes != 0) all.moved.push_back({point, goes, (by_a + by_b) * 0.5});
+    if (stays != 0 && stays != 7) all.sliders.push_back({point, stays});
     if (!load.edge_forces_n.empty()) middle[{std::min(a, b), std::max(a, b)}] = point;
   }
   for (const auto& [edge, force] : load.edge_forces_n) {

@@ -1,5 +1,6 @@
 #include "osteo/tissue/problem.h"
 
+#include <algorithm>
 #include <functional>
 
 #include "osteo/base/error.h"
@@ -32,8 +33,9 @@ class ProblemReader {
     file_.require_format("osteotome_tissue");
     file_.allow(root, "", Names{"osteotome_tissue", "$schema", "about", "material", "regions", "fixed", "loads"});
     const JsonValue& general = file_.need(root, "", "material");
-    file_.allow(general, "material", Names{"young_kpa", "poisson", "about"});
+    file_.allow(general, "material", Names{"young_kpa", "poisson", "density_kg_m3", "about"});
     problem_.general = material_of(file_, general, "material");
+    density_.assign(mesh_.tets.size(), density_of(general, "material").value_or(0));
     const auto& regions = items(root, "regions", false);
     problem_.materials.assign(regions.empty() ? 1 : mesh_.tets.size(), problem_.general);
     each(regions, "region", [&](const JsonValue& r, const std::string& where) { read_region(r, where); });
@@ -80,21 +82,28 @@ class ProblemReader {
   }
 
   void read_region(const JsonValue& r, const std::string& where) {
-    const Place in = place(r, where, {"young_kpa", "poisson"});
+    const Place in = place(r, where, {"young_kpa", "poisson", "density_kg_m3"});
     const Material m = material_of(file_, r, where);
+    const std::optional<double> density = density_of(r, where);
     std::size_t hit = 0;
     for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
       Vec3 middle{};
       for (const std::uint32_t p : mesh_.tets[t]) middle += from_floats(mesh_.points_mm[p]) / 4;
       if (!in(middle)) continue;
       problem_.materials[t] = m;
+      if (density) density_[t] = *density;
       ++hit;
     }
     if (hit == 0) throw file_.wrong(r, where + ": no tetrahedron lies in it", kWhere);
   }
 
-  void read_fixed(const JsonValue& f, const std::string& where) {
-    const Place in = place(f, where, {"axes"});
+  [[nodiscard]] std::optional<double> density_of(const JsonValue& v, const std::string& where) const {
+    const JsonValue* const given = v.find("density_kg_m3");
+    if (given == nullptr) return std::nullopt;
+    return file_.number(*given, where + ": \"density_kg_m3\"", 1, 30000);
+  }
+
+  [[nodiscard]] std::uint8_t axes_of(const JsonValue& f, const std::string& where) const {
     std::uint8_t axes = 7;
     if (const JsonValue* const given = f.find("axes"); given != nullptr) {
       axes = 0;
@@ -104,6 +113,12 @@ class ProblemReader {
       }
       if (axes == 0) throw file_.wrong(*given, where + ": \"axes\" names none", "leave it out to hold all three");
     }
+    return axes;
+  }
+
+  void read_fixed(const JsonValue& f, const std::string& where) {
+    const Place in = place(f, where, {"axes"});
+    const std::uint8_t axes = axes_of(f, where);
     std::size_t hit = 0;
     for (std::uint32_t p = 0; p < held_.size(); ++p) {
       if (!in(from_floats(mesh_.points_mm[p]))) continue;
@@ -119,14 +134,21 @@ class ProblemReader {
   }
 
   void read_load(const JsonValue& l, const std::string& where) {
-    file_.allow(l, where, Names{"name", "about", "forces", "surfaces"});
-    if (l.find("forces") == nullptr && l.find("surfaces") == nullptr)
-      throw file_.wrong(l, where + ": it has neither \"forces\" nor \"surfaces\"");
+    const Names kinds{"forces", "surfaces", "volumes", "gravity_m_s2", "moved", "contacts"};
+    Names known{"name", "about"};
+    known.insert(known.end(), kinds.begin(), kinds.end());
+    file_.allow(l, where, known);
+    if (std::none_of(kinds.begin(), kinds.end(), [&](const std::string& k) { return l.find(k) != nullptr; }))
+      throw file_.wrong(l, where + ": it has none of \"forces\", \"surfaces\", \"volumes\", \"gravity_m_s2\", \"moved\" and \"contacts\"");
     TissueLoad load;
     load.fixed = problem_.fixed;
     load.sliders = problem_.sliders;
     each(items(l, "surfaces", false), where + ", surface", [&](const JsonValue& s, const std::string& at) { add_surface(load, s, at); });
     each(items(l, "forces", false), where + ", force", [&](const JsonValue& f, const std::string& at) { add_force(load, f, at); });
+    each(items(l, "volumes", false), where + ", volume", [&](const JsonValue& v, const std::string& at) { add_volume(load, v, at); });
+    if (const JsonValue* const g = l.find("gravity_m_s2"); g != nullptr) add_gravity(load, *g, where);
+    each(items(l, "moved", false), where + ", moved", [&](const JsonValue& m, const std::string& at) { add_moved(load, m, at); });
+    each(items(l, "contacts", false), where + ", contact", [&](const JsonValue& c, const std::string& at) { add_contact(load, c, at); });
     const JsonValue* const name = l.find("name");
     problem_.load_names.push_back(name != nullptr ? file_.text(*name, where + ": \"name\"") : where);
     problem_.loads.push_back(std::move(load));
@@ -164,11 +186,82 @@ class ProblemReader {
     for (const std::uint32_t p : near) load.forces_n.push_back({p, total / static_cast<double>(near.size())});
   }
 
+  [[nodiscard]] double volume_of(std::size_t t) const {
+    const auto at = [&](std::size_t i) { return from_floats(mesh_.points_mm[mesh_.tets[t][i]]); };
+    return dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0)) / 6;
+  }
+
+  void add_volume(TissueLoad& load, const JsonValue& v, const std::string& where) {
+    const Place in = place(v, where, {"total_n"});
+    const Vec3 total = triple(file_.need(v, where, "total_n"), where + ": \"total_n\"", 1e6);
+    std::vector<std::size_t> within;
+    double sum = 0;
+    for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
+      Vec3 middle{};
+      for (const std::uint32_t p : mesh_.tets[t]) middle += from_floats(mesh_.points_mm[p]) / 4;
+      if (!in(middle)) continue;
+      within.push_back(t);
+      sum += volume_of(t);
+    }
+    if (within.empty()) throw file_.wrong(v, where + ": no tetrahedron lies in it", kWhere);
+    for (const std::size_t t : within) load.add_in_tet(mesh_.tets[t], total * (volume_of(t) / sum));
+  }
+
+  void add_gravity(TissueLoad& load, const JsonValue& g, const std::string& where) {
+    const Vec3 pull = triple(g, where + ": \"gravity_m_s2\"", 1e4);
+    constexpr double kNewtonPerMm3 = 1e-9;  // of 1 kg/m3 at 1 m/s2
+    for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
+      if (density_[t] == 0)
+        throw file_.wrong(g,
+                          where + ": gravity needs a \"density_kg_m3\" for all of the body; tetrahedron " + std::to_string(t) + " has none",
+                          "give the material one; soft tissue has about 1050, bone 1900");
+      load.add_in_tet(mesh_.tets[t], pull * (density_[t] * volume_of(t) * kNewtonPerMm3));
+    }
+  }
+
+  void add_moved(TissueLoad& load, const JsonValue& m, const std::string& where) {
+    const Place in = place(m, where, {"axes", "by_mm"});
+    const std::uint8_t axes = axes_of(m, where);
+    const Vec3 by = triple(file_.need(m, where, "by_mm"), where + ": \"by_mm\"", 1e4);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if ((axes >> a & 1) == 0 && by[a] != 0)
+        throw file_.wrong(m, where + ": \"by_mm\" moves along an axis that \"axes\" leaves free", "give 0 there, or name the axis");
+    }
+    std::size_t hit = 0;
+    for (std::uint32_t p = 0; p < held_.size(); ++p) {
+      if (!in(from_floats(mesh_.points_mm[p]))) continue;
+      if (held_[p])
+        throw file_.wrong(m, where + ": point " + std::to_string(p) + " is to move and is fixed", "let the two places not overlap");
+      load.moved.push_back({p, axes, by});
+      ++hit;
+    }
+    if (hit == 0) throw file_.wrong(m, where + ": no point lies in it", kWhere);
+  }
+
+  void add_contact(TissueLoad& load, const JsonValue& c, const std::string& where) {
+    file_.allow(c, where, Names{"name", "about", "at_mm", "normal", "radius_mm", "stiffness_n_per_mm"});
+    const Vec3 at = triple(file_.need(c, where, "at_mm"), where + ": \"at_mm\"", kFarMm);
+    const JsonValue *const normal = c.find("normal"), *const radius = c.find("radius_mm");
+    if ((normal != nullptr) == (radius != nullptr))
+      throw file_.wrong(c, where + ": it needs \"normal\" (a plane that the body lies before) or \"radius_mm\" (a ball)");
+    RigidContact contact;
+    contact.stiffness_n_per_mm = file_.number(file_.need(c, where, "stiffness_n_per_mm"), where + ": \"stiffness_n_per_mm\"", 1e-9, 1e9);
+    if (normal != nullptr) {
+      const Vec3 out = triple(*normal, where + ": \"normal\"", 1e6);
+      if (!(length(out) > 1e-9)) throw file_.wrong(*normal, where + ": \"normal\" has no length");
+      contact.shape = std::make_shared<PlaneShape>(at, out);
+    } else {
+      contact.shape = std::make_shared<BallShape>(at, file_.number(*radius, where + ": \"radius_mm\"", 1e-6, kFarMm), false);
+    }
+    load.contacts.push_back(std::move(contact));
+  }
+
   const JsonFile file_;
   const TetMesh& mesh_;
   TissueProblem problem_;
-  std::vector<bool> held_;  // along all axes
-  TriMesh boundary_;        // made when a surface is loaded
+  std::vector<bool> held_;       // along all axes
+  std::vector<double> density_;  // of each tetrahedron; 0: not given
+  TriMesh boundary_;             // made when a surface is loaded
   std::vector<std::uint32_t> point_of_;
 };
 

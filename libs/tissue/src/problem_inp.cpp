@@ -1,7 +1,9 @@
 #include "problem_inp.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <map>
 
 #include "osteo/base/error.h"
@@ -40,6 +42,10 @@ class Reader {
           throw fail(card, "only isotropic elasticity is read");
         *open = {number(card, 0, 0), number(card, 0, 1)};
         law(card, ElasticLaw::linear);
+      } else if (card.name == "DENSITY") {
+        if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
+        densities_[open] = number(card, 0, 0);
+        if (!(densities_[open] > 0)) throw fail(card, "a density is above 0 (tonnes/mm3)");
       } else if (card.name == "HYPERELASTIC") {
         if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
         if (!card.options.contains("NEO HOOKE")) throw fail(card, "of hyperelastic laws only NEO HOOKE is read");
@@ -51,8 +57,12 @@ class Reader {
       } else if (card.name == "SOLID SECTION") {
         sections_.push_back({option(card, "ELSET"), option(card, "MATERIAL"), &card});
       } else if (card.name == "BOUNDARY") {
-        if (in_step) throw fail(card, "*BOUNDARY inside a *STEP is not read", "put it before the first *STEP");
-        boundary(card);
+        if (in_step) {
+          if (card.options.contains("OP")) throw fail(card, "OP= is not read: each step stands for itself");
+          boundary_of_step(card, problem_.loads.back());
+        } else {
+          boundary(card);
+        }
       } else if (card.name == "STEP") {
         in_step = true;
         large = large || (card.options.contains("NLGEOM") && card.options.at("NLGEOM") != "NO");
@@ -62,21 +72,29 @@ class Reader {
       } else if (card.name == "CLOAD" || card.name == "DLOAD") {
         if (!in_step) throw fail(card, "it stands outside a *STEP");
         card.name == "CLOAD" ? cload(card, problem_.loads.back()) : dload(card, problem_.loads.back());
-      } else if (card.name != "STATIC" && card.name != "END STEP" && card.name != "DENSITY" && !card.name.ends_with("PRINT") &&
-                 !card.name.ends_with("FILE") && !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" && card.name != "PREPRINT" &&
-                 card.name != "RESTART" && card.name != "ASSEMBLY" && card.name != "END ASSEMBLY") {
+      } else if (card.name != "STATIC" && card.name != "END STEP" && !card.name.ends_with("PRINT") && !card.name.ends_with("FILE") &&
+                 !card.name.ends_with("OUTPUT") && card.name != "CONTROLS" && card.name != "PREPRINT" && card.name != "RESTART" &&
+                 card.name != "ASSEMBLY" && card.name != "END ASSEMBLY") {
         throw fail(card, "this card is not read, and might change the answer", "docs/tissue.md lists what is");
       }
     }
     settle_boundary();
     if (needs_loads && problem_.loads.empty()) throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
     materials();
+    for (const Pull& p : pulls_) pull(p);
     problem_.order = file_.quadratic ? TetOrder::t10 : TetOrder::t4;
     if (problem_.law == ElasticLaw::linear && large) problem_.law = ElasticLaw::stvk;
     return std::move(problem_);
   }
 
  private:
+  // Gravity, which needs the materials, that may come later.
+  struct Pull {
+    std::size_t load;
+    std::vector<long> elements;
+    Vec3 mm_s2;
+    const InpCard* card;
+  };
   struct Section {
     std::string set, material;
     const InpCard* card;
@@ -121,7 +139,8 @@ class Reader {
                    last = named != kNamed.end()               ? named->second[1]
                           : row.size() > 2 && !row[2].empty() ? number_of(card, row[2])
                                                               : first;
-      if (row.size() > 3 && number_of(card, row[3]) != 0) throw fail(card, "points that are moved by it are not read, only held ones");
+      if (row.size() > 3 && number_of(card, row[3]) != 0)
+        throw fail(card, "points that are moved outside a *STEP are not read", "put them into the *STEP");
       if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
       for (const long node : members(card, file_.node_sets, row[0])) {
         std::uint8_t& axes = held_[node];
@@ -129,6 +148,41 @@ class Reader {
         last_boundary_ = &card;
       }
     }
+  }
+  // Points that a step moves, or holds besides.
+  void boundary_of_step(const InpCard& card, TissueLoad& load) {
+    std::map<long, std::pair<std::uint8_t, Vec3>> moved;
+    for (const auto& row : card.rows) {
+      if (row.size() < 2) throw fail(card, "a line holds less than a node and an axis");
+      const double first = number_of(card, row[1]), last = row.size() > 2 && !row[2].empty() ? number_of(card, row[2]) : first,
+                   by = row.size() > 3 ? number_of(card, row[3]) : 0;
+      if (!(first >= 1 && last <= 3 && first <= last)) throw fail(card, "axes go from 1 to 3, not " + row[1]);
+      for (const long node : members(card, file_.node_sets, row[0])) {
+        auto& [axes, v] = moved[node];
+        for (int a = static_cast<int>(first); a <= static_cast<int>(last); ++a) {
+          axes = static_cast<std::uint8_t>(axes | 1 << (a - 1));
+          v[static_cast<std::size_t>(a) - 1] = by;
+        }
+      }
+    }
+    std::map<std::uint32_t, std::pair<std::uint8_t, Vec3>> of_point;
+    for (const auto& [node, how] : moved) {
+      if (const auto p = file_.point_of.find(node); p != file_.point_of.end()) of_point[p->second] = how;
+    }
+    for (const auto& [node, how] : moved) {
+      const auto middle = file_.middle_of.find(node);
+      if (file_.point_of.contains(node) || middle == file_.middle_of.end()) continue;
+      Vec3 mean{};
+      bool both = true;
+      for (const std::uint32_t end : middle->second) {
+        const auto found = of_point.find(end);
+        both = both && found != of_point.end() && found->second.first == how.first;
+        if (found != of_point.end()) mean += found->second.second / 2;
+      }
+      if (!both || length(mean - how.second) > 1e-6 * (length(how.second) + 1e-9))
+        throw fail(card, "node " + std::to_string(node) + " in the middle of an edge moves otherwise than its ends");
+    }
+    for (const auto& [p, how] : of_point) load.moved.push_back({p, how.first, how.second});
   }
   // Nodes in the middle of edges follow from their ends.
   void settle_boundary() {
@@ -173,8 +227,13 @@ class Reader {
   void dload(const InpCard& card, TissueLoad& load) {
     constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
     for (const auto& row : card.rows) {
+      if (row.size() >= 6 && row[1] == "GRAV") {
+        const Vec3 along{number_of(card, row[3]), number_of(card, row[4]), number_of(card, row[5])};
+        pulls_.push_back({problem_.loads.size() - 1, members(card, file_.element_sets, row[0]), along * number_of(card, row[2]), &card});
+        continue;
+      }
       if (row.size() < 3 || row[1].size() != 2 || row[1][0] != 'P' || row[1][1] < '1' || row[1][1] > '4')
-        throw fail(card, "only pressures P1 to P4 on faces are read");
+        throw fail(card, "only pressures P1 to P4 on faces and GRAV with its size and direction are read");
       const double pressure = number_of(card, row[2]);
       for (const long element : members(card, file_.element_sets, row[0])) {
         const auto found = file_.corners_of.find(element);
@@ -190,7 +249,20 @@ class Reader {
       }
     }
   }
+  void pull(const Pull& p) {
+    TissueLoad& load = problem_.loads[p.load];
+    for (const long element : p.elements) {
+      const auto found = file_.corners_of.find(element);
+      if (found == file_.corners_of.end()) throw fail(*p.card, "there is no element " + std::to_string(element));
+      const auto at = [&](std::size_t i) { return from_floats(file_.mesh.points_mm[found->second[i]]); };
+      const double volume = std::abs(dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0))) / 6,
+                   density = density_of_tet_[file_.tet_of.at(element)];
+      if (!(density > 0)) throw fail(*p.card, "the material of element " + std::to_string(element) + " has no *DENSITY");
+      load.add_in_tet(found->second, p.mm_s2 * (density * volume));
+    }
+  }
   void materials() {
+    density_of_tet_.assign(file_.mesh.tets.size(), 0);
     if (sections_.empty()) throw Error(ExitCode::usage, "the tissue problem, materials: there is no *SOLID SECTION");
     problem_.materials.assign(file_.mesh.tets.size(), {0, 0});
     for (const Section& s : sections_) {
@@ -202,6 +274,8 @@ class Reader {
         const auto t = file_.tet_of.find(e);
         if (t == file_.tet_of.end()) throw fail(*s.card, "there is no element " + std::to_string(e));
         problem_.materials[t->second] = m->second;
+        const auto d = densities_.find(&m->second);
+        density_of_tet_[t->second] = d != densities_.end() ? d->second : 0;
       }
     }
     for (std::size_t t = 0; t < problem_.materials.size(); ++t) {
@@ -219,6 +293,9 @@ class Reader {
   TissueProblem problem_;
   std::map<std::string, Material> materials_;
   std::vector<Section> sections_;
+  std::vector<Pull> pulls_;
+  std::map<const Material*, double> densities_;  // tonnes/mm3
+  std::vector<double> density_of_tet_;
   std::map<long, std::uint8_t> held_;
   const InpCard* last_boundary_ = nullptr;
   bool settled_ = false;
@@ -232,6 +309,19 @@ TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool ne
 
 }  // namespace tissue
 
+namespace {
+
+// CalculiX reads 20 characters of a field and cuts the rest off, an exponent too.
+std::string field(double v) {
+  char text[40];
+  for (int digits = 17;; --digits) {
+    std::snprintf(text, sizeof text, "%.*g", digits, v);
+    if (std::strlen(text) <= 20) return text;
+  }
+}
+
+}  // namespace
+
 std::string inp_text(const FemBody& body, const TissueLoad& load) {
   if (body.law() == ElasticLaw::neo_hooke)
     throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
@@ -239,8 +329,7 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
   char line[160];
   for (std::size_t p = 0; p < body.point_count(); ++p) {
     const Vec3 x = body.rest()[p];
-    std::snprintf(line, sizeof line, "%zu, %.15g, %.15g, %.15g\n", p + 1, x.x, x.y, x.z);
-    t += line;
+    t += std::to_string(p + 1) + ", " + field(x.x) + ", " + field(x.y) + ", " + field(x.z) + "\n";
   }
   t += body.order() == TetOrder::t4 ? "*ELEMENT, TYPE=C3D4, ELSET=EALL\n" : "*ELEMENT, TYPE=C3D10, ELSET=EALL\n";
   for (std::size_t e = 0; e < body.element_count(); ++e) {
@@ -259,16 +348,16 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
     ++number;
     const Material m{material.first, material.second};
     const bool split = body.law() == ElasticLaw::neo_hooke_split;
-    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%.15g, %.15g\n*ELSET, ELSET=E%d\n", number,
-                  split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC", split ? m.shear_mpa() / 2 : m.young_mpa,
-                  split ? 2 / m.bulk_mpa() : m.poisson, number);
+    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%s, %s\n*ELSET, ELSET=E%d\n", number,
+                  split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC", field(split ? m.shear_mpa() / 2 : m.young_mpa).c_str(),
+                  field(split ? 2 / m.bulk_mpa() : m.poisson).c_str(), number);
     t += line;
     for (std::size_t i = 0; i < elements.size(); ++i)
       t += std::to_string(elements[i]) + (i % 12 == 11 || i + 1 == elements.size() ? "\n" : ", ");
     std::snprintf(line, sizeof line, "*SOLID SECTION, ELSET=E%d, MATERIAL=M%d\n", number, number);
     t += line;
   }
-  t += "*BOUNDARY\n";
+  if (!load.fixed.empty() || !load.sliders.empty()) t += "*BOUNDARY\n";
   for (const std::uint32_t p : load.fixed) t += std::to_string(p + 1) + ", 1, 3\n";
   for (const Slider& s : load.sliders) {
     for (int a = 0; a < 3; ++a) {
@@ -276,14 +365,22 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
     }
   }
   t += body.law() == ElasticLaw::linear ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n1, 1\n";
-  t += "*CLOAD\n";
+  if (!load.moved.empty()) t += "*BOUNDARY\n";
+  for (const TissueLoad::Moved& m : load.moved) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      if ((m.held >> a & 1) == 0) continue;
+      const std::string axis = std::to_string(a + 1);
+      t += std::to_string(m.point + 1) + ", " + axis + ", " + axis + ", " + field(m.by_mm[a]) + "\n";
+    }
+  }
+  if (!load.contacts.empty()) throw Error(ExitCode::usage, "contact with rigid things is not written to .inp", "choose a load without");
   std::map<std::uint32_t, Vec3> forces;  // some points have several, which a later line would replace
   for (const auto& [p, f] : load.forces_n) forces[p] += f;
+  if (!forces.empty()) t += "*CLOAD\n";
   for (const auto& [p, f] : forces) {
     for (std::size_t a = 0; a < 3; ++a) {
       if (f[a] == 0) continue;
-      std::snprintf(line, sizeof line, "%u, %zu, %.15g\n", p + 1, a + 1, f[a]);
-      t += line;
+      t += std::to_string(p + 1) + ", " + std::to_string(a + 1) + ", " + field(f[a]) + "\n";
     }
   }
   return t + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n";

@@ -70,7 +70,7 @@ Shine shine_through(const StructureMap& structures, Vec3 p, Vec3 inwards) {
 }
 
 BonePaint::BonePaint(const BrickGrid& bone, const StructureMap* structures, std::shared_ptr<const Hardness> hardness)
-    : structures_(structures), hardness_(std::move(hardness)), openness_(bone) {}
+    : structures_(structures), hardness_(std::move(hardness)), openness_(std::make_shared<Openness>(bone)) {}
 
 // The densest of a millimetre below, so that a thin cortex counts as one.
 double BonePaint::density_below(const BrickGrid& bone, Vec3 index, Vec3 outwards) const {
@@ -107,7 +107,7 @@ void BonePaint::paint(const BrickGrid& bone, const SurfacePatch& patch, std::vec
         for (std::size_t c = 0; c < 3; ++c) colour[c] += shine.share * (below[c] - colour[c]);
       }
     }
-    const double light = kDarkest + (1 - kDarkest) * openness_.at(v.index, v.normal);
+    const double light = kDarkest + (1 - kDarkest) * openness_->at(v.index, v.normal, others_);
     for (std::size_t c = 0; c < 3; ++c)
       colours[n][c] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(light * colour[c], 0.0, 0.95)));
   }

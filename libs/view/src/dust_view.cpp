@@ -4,8 +4,6 @@
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
 #include <vtkNew.h>
-#include <vtkObjectFactory.h>
-#include <vtkOpenGLActor.h>
 #include <vtkPointData.h>
 #include <vtkPointGaussianMapper.h>
 #include <vtkPoints.h>
@@ -20,38 +18,12 @@
 #include <cmath>
 #include <optional>
 
+#include "chance.h"
 #include "liquid_surface.h"
+#include "osteo/view/actors.h"
 
 namespace osteo {
 namespace {
-
-// Numbers from 0 to 1 that follow from a cell alone.
-class Chance {
- public:
-  Chance(std::int64_t i, std::int64_t j, std::int64_t k) : state_(static_cast<std::uint64_t>(i * 73856093 ^ j * 19349663 ^ k * 83492791)) {}
-  float next() {  // splitmix64 (G. Steele, D. Lea, C. Flood 2014)
-    state_ += 0x9e3779b97f4a7c15ULL;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return static_cast<float>((z ^ (z >> 31)) >> 40) / 16777216.0F;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
-// Drawn when all else is, blended over it where nothing is in front. VTK's own translucent pass loses the depth of what is opaque where the
-// window's depth buffer has another format than the pass', and then draws water through bone.
-class LateActor : public vtkOpenGLActor {
- public:
-  static LateActor* New();
-  vtkTypeMacro(LateActor, vtkOpenGLActor);
-  vtkTypeBool HasTranslucentPolygonalGeometry() override { return 0; }
-  int RenderOpaqueGeometry(vtkViewport*) override { return 0; }
-  int RenderOverlay(vtkViewport* viewport) override { return GetVisibility() != 0 ? vtkOpenGLActor::RenderOpaqueGeometry(viewport) : 0; }
-};
-vtkStandardNewMacro(LateActor);
 
 // Balls, drawn as discs that face the eye: round, darker at the rim, and solid.
 struct Balls {
@@ -111,7 +83,7 @@ struct DustView::Impl {
   Balls grains, drops;
   vtkNew<vtkPolyData> water_data;
   vtkNew<vtkPolyDataMapper> water_mapper;
-  vtkNew<LateActor> water;
+  vtkSmartPointer<vtkActor> water = make_late_actor(Late::nearest);  // in one layer
   vtkRenderer* renderer = nullptr;
   double cell_mm = 0.5;
   const Dust* of = nullptr;
@@ -168,10 +140,8 @@ struct DustView::Impl {
     water->SetVisibility(s.triangles.empty() ? 0 : 1);
     drops.clear();
     for (const auto& d : s.drops) {
-      Chance chance(std::lround(d[0] * 64), std::lround(d[1] * 64), std::lround(d[2] * 64));
-      const auto aside = [&] { return cell_mm * (static_cast<double>(chance.next()) - 0.5); };
-      const Vec3 at{static_cast<double>(d[0]) + aside(), static_cast<double>(d[1]) + aside(), static_cast<double>(d[2]) + aside()};
-      drops.add(at, d[3], 0.62F, 0.68F, 0.74F);
+      const auto mix = [&](float clear, float bone) { return clear + (bone - clear) * d.thick; };
+      drops.add(from_floats(d.middle_mm), d.radius_mm, mix(0.62F, 0.84F), mix(0.68F, 0.74F), mix(0.74F, 0.62F));
     }
     drops.changed();
   }
@@ -183,8 +153,6 @@ DustView::DustView(vtkRenderer* renderer, double cell_mm) : impl_(std::make_uniq
   m.cell_mm = cell_mm;
   m.water_mapper->SetInputData(m.water_data);
   m.water->SetMapper(m.water_mapper);
-  m.water->ForceOpaqueOn();
-  m.water->PickableOff();
   vtkProperty* const p = m.water->GetProperty();
   p->BackfaceCullingOn();
   p->SetAmbient(0.1);
@@ -198,14 +166,13 @@ DustView::DustView(vtkRenderer* renderer, double cell_mm) : impl_(std::make_uniq
       "  fragOutput0.a = clamp(fragOutput0.a + 1.2 * max(0.0, dot(fragOutput0.rgb, vec3(0.333)) - 0.85), 0.0, 1.0);\n",
       false);
   m.water->VisibilityOff();
-  for (vtkActor* const a : {m.grains.actor.Get(), m.drops.actor.Get(), static_cast<vtkActor*>(m.water.Get())}) renderer->AddActor(a);
+  for (vtkActor* const a : {m.grains.actor.Get(), m.drops.actor.Get(), m.water.Get()}) renderer->AddActor(a);
   m.grains.actor->VisibilityOff();
   m.drops.actor->VisibilityOff();
 }
 
 DustView::~DustView() {
-  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), static_cast<vtkActor*>(impl_->water.Get())})
-    impl_->renderer->RemoveActor(a);
+  for (vtkActor* const a : {impl_->grains.actor.Get(), impl_->drops.actor.Get(), impl_->water.Get()}) impl_->renderer->RemoveActor(a);
 }
 
 void DustView::update(const Dust& dust) {

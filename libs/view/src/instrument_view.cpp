@@ -84,6 +84,12 @@ void InstrumentView::hide() {
   for (Impl::Part* const p : {&impl_->head, &impl_->shaft, &impl_->ghost}) p->actor->VisibilityOff();
 }
 
+void InstrumentView::tell_apart(Vec3 colour, double opacity) {
+  impl_->shaft.mapper->ScalarVisibilityOff();
+  impl_->shaft.actor->GetProperty()->SetColor(colour.x, colour.y, colour.z);
+  for (Impl::Part* const p : {&impl_->head, &impl_->shaft}) p->actor->GetProperty()->SetOpacity(opacity);
+}
+
 void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid) {
   Impl& m = *impl_;
   if ((tick.flags & kPlateInHand) != 0) return hide();

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "chance.h"
 #include "osteo/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {
+
+constexpr float kLeastDrop = 0.004F;  // of a cell: a mist nobody would see
 
 struct Cell {
   float full = 0, solid = 0;
@@ -18,6 +21,7 @@ struct Field {
   BrickGrid grid;                  // bone and water: 1 where either is
   std::vector<Cell> cells;         // of each voxel of the grid
   std::vector<std::uint32_t> wet;  // bricks that hold water
+  std::vector<VoxelKey> falling;   // voxels whose water is in the air; not in `grid`
   Ijk shift;                       // from the grid's coordinates to the bone's
 };
 
@@ -28,6 +32,22 @@ std::array<std::uint8_t, 4> colour_of(const Cell& c) {
   const float alpha = mix(0.20F * film + 0.25F * thick * film, mix(0.40F, 0.92F, thick), deep);
   const auto byte = [](float v) { return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0F, 1.0F))); };
   return {byte(mix(0.36F, 0.84F, thick)), byte(mix(0.34F, 0.74F, thick)), byte(mix(0.34F, 0.62F, thick)), byte(alpha)};
+}
+
+// Whether the water of a cell rests on something: bone beside it, or water below it down to bone.
+bool stands(const Field& f, const BrickGrid& bone, Ijk at, Vec3 step) {
+  const auto is_bone = [&](Ijk c) { return bone.at(c.i + f.shift.i, c.j + f.shift.j, c.k + f.shift.k) >= 0.5F; };
+  for (int dk = -1; dk <= 1; ++dk)
+    for (int dj = -1; dj <= 1; ++dj)
+      for (int di = -1; di <= 1; ++di)
+        if (is_bone({at.i + di, at.j + dj, at.k + dk})) return true;
+  const Vec3 from{double(at.i), double(at.j), double(at.k)};
+  for (int n = 1;; ++n) {
+    const Vec3 p = from + step * n;
+    const Ijk c{static_cast<int>(std::lround(p.x)), static_cast<int>(std::lround(p.y)), static_cast<int>(std::lround(p.z))};
+    if (is_bone(c)) return true;
+    if (!(f.grid.at(c.i, c.j, c.k) >= 0.5F)) return false;  // air, or beyond what is stored
+  }
 }
 
 Field field_of(const Dust& dust) {
@@ -82,6 +102,13 @@ Field field_of(const Dust& dust) {
     f.cells[v] = w.cell;
     f.grid.set(v, std::min(1.0F, f.grid.value(v) + w.cell.full));
   }
+  const Vec3 down = frame.index_from_world(frame.origin_mm + dust.gravity());
+  const double most = std::max({std::abs(down.x), std::abs(down.y), std::abs(down.z)});
+  for (const Wet& w : wet) {
+    const Ijk at{w.at.i - f.shift.i, w.at.j - f.shift.j, w.at.k - f.shift.k};
+    if (w.cell.full >= kLeastDrop && !(most > 0 && stands(f, bone, at, down / most))) f.falling.push_back(f.grid.find(at.i, at.j, at.k));
+  }
+  for (const VoxelKey v : f.falling) f.grid.set(v, std::max(0.0F, f.grid.value(v) - f.cells[v].full));
   return f;
 }
 
@@ -135,18 +162,17 @@ LiquidSurface liquid_surface(const Dust& dust) {
     out.normals.push_back(to_floats(normals[p]));
     out.points_mm[p] = to_floats(from_floats(out.points_mm[p]) + normals[p] * kOutMm);
   }
-  // In the air: nothing solid beside it, and less than half a cell.
-  for (const std::uint32_t b : f.wet) {
-    for (VoxelKey v = b * BrickGrid::kVoxels; v < (b + 1) * BrickGrid::kVoxels; ++v) {
-      const Cell& c = f.cells[v];
-      if (c.full < 0.004F || f.grid.value(v) >= 0.5F) continue;
-      const Ijk at = f.grid.coordinate(v);
-      const bool beside = f.grid.at(at.i - 1, at.j, at.k) >= 0.5F || f.grid.at(at.i + 1, at.j, at.k) >= 0.5F ||
-                          f.grid.at(at.i, at.j - 1, at.k) >= 0.5F || f.grid.at(at.i, at.j + 1, at.k) >= 0.5F ||
-                          f.grid.at(at.i, at.j, at.k - 1) >= 0.5F || f.grid.at(at.i, at.j, at.k + 1) >= 0.5F;
-      if (beside) continue;
-      const auto p = to_floats(frame.world_from_index({double(at.i), double(at.j), double(at.k)}));
-      out.drops.push_back({p[0], p[1], p[2], static_cast<float>(frame.spacing_mm.x * 0.62 * std::cbrt(static_cast<double>(c.full)))});
+  for (const VoxelKey v : f.falling) {
+    const Cell& c = f.cells[v];
+    const Ijk at = f.grid.coordinate(v);
+    Chance chance(at.i + f.shift.i, at.j + f.shift.j, at.k + f.shift.k);
+    const int count = std::max(1, static_cast<int>(std::lround(4 * std::min(1.0F, c.full))));
+    // Balls of the cell's volume together.
+    const double radius = frame.spacing_mm.x * 0.62 * std::cbrt(static_cast<double>(c.full) / count);
+    for (int n = 0; n < count; ++n) {
+      const auto aside = [&] { return LiquidSurface::kSpread * (static_cast<double>(chance.next()) - 0.5); };
+      const Vec3 p = frame.world_from_index(Vec3{double(at.i), double(at.j), double(at.k)} + Vec3{aside(), aside(), aside()});
+      out.drops.push_back({to_floats(p), static_cast<float>(radius) * (0.8F + 0.4F * chance.next()), std::min(1.0F, c.solid / 0.12F)});
     }
   }
   return out;

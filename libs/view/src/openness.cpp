@@ -19,15 +19,20 @@ constexpr double kSlack = 1.04;
 
 }  // namespace
 
-Openness::Openness(const BrickGrid& bone, int threads) {
+Openness::Openness(const BrickGrid& bone, int threads) : frame_(bone.frame()) {
   const Vec3 s = bone.frame().spacing_mm;
   const double voxel_mm = std::cbrt(s.x * s.y * s.z);
   edge_ = 1;
   while (edge_ < 8 && edge_ * voxel_mm * 1.42 < 1) edge_ *= 2;
-  std::array<int, 3> most{};
+  std::array<int, 3> most{}, least{bone.frame().dims};
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
     const Ijk o = bone.brick_coordinate(b);
+    least = {std::min(least[0], o.i), std::min(least[1], o.j), std::min(least[2], o.k)};
     most = {std::max(most[0], o.i), std::max(most[1], o.j), std::max(most[2], o.k)};
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    box_[0][a] = 8 * least[a] - 0.5;
+    box_[1][a] = 8 * most[a] + 7.5;
   }
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     Level& level = levels_[l];
@@ -121,19 +126,37 @@ double Openness::sample(const Level& level, Vec3 index) {
   return sum / 255;
 }
 
-double Openness::at(const std::array<float, 3>& index, const std::array<float, 3>& normal) const {
-  const Vec3 p{static_cast<double>(index[0]), static_cast<double>(index[1]), static_cast<double>(index[2])},
-      n{static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])};
+bool Openness::reaches(Vec3 world_mm) const {
+  const Vec3 x = frame_.index_from_world(world_mm);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double reach = kReachMm / frame_.spacing_mm[a];
+    if (x[a] < box_[0][a] - reach || x[a] > box_[1][a] + reach) return false;
+  }
+  return true;
+}
+
+double Openness::at(const std::array<float, 3>& index, const std::array<float, 3>& normal,
+                    std::span<const std::shared_ptr<const Openness>> others) const {
+  const Vec3 p = from_floats(index), n = from_floats(normal);
   const Vec3 u = any_perpendicular(n), v = cross(n, u);
   const double up = std::cos(kTilt), out = std::sin(kTilt);
   const Vec3 ways[5] = {n, n * up + u * out, n * up - u * out, n * up + v * out, n * up - v * out};
+  const Openness* near[4] = {};
+  std::size_t count = 0;
+  for (const auto& other : others) {
+    if (count < std::size(near) && other->reaches(frame_.world_from_index(p))) near[count++] = other.get();
+  }
   double open = 0;
   for (std::size_t w = 0; w < 5; ++w) {
     // How far along: a cone as wide as its cells, started clear of the face it stands on.
     double free = 1;
-    for (const Level& level : levels_) {
-      const double there = sample(level, p + ways[w] * ((w == 0 ? kAhead : kAside) * level.edge_voxels));
-      free *= 1 - there;
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      const Vec3 at = p + ways[w] * ((w == 0 ? kAhead : kAside) * levels_[l].edge_voxels);
+      double there = sample(levels_[l], at);
+      // No two bodies hold the same bone; cells on their border are filled by both.
+      for (std::size_t o = 0; o < count; ++o)
+        there += sample(near[o]->levels_[l], near[o]->frame_.index_from_world(frame_.world_from_index(at)));
+      free *= 1 - std::min(1.0, there);
     }
     open += free * (w == 0 ? kMiddle : (1 - kMiddle) / 4);
   }

@@ -42,44 +42,90 @@ WorldView::~WorldView() {
   if (soft_actor_) renderer_->RemoveActor(soft_actor_);
 }
 
-void WorldView::update(const World& world, SceneReaders& readers) {
+void WorldView::update(const World& world, SceneReaders& readers, Work work) {
   const auto now = std::chrono::steady_clock::now();
-  std::erase_if(bodies_, [&](const auto& b) { return world.find(b.first) == nullptr; });
+  const bool gone = std::erase_if(bodies_, [&](const auto& b) { return world.find(b.first) == nullptr; }) > 0;
   if (readers.surface) {
     // Normals a little way off a cut may follow a quarter of a second later.
     constexpr std::chrono::milliseconds kSettle{250};
     readers.surface->shade();
-    if (now >= settle_at_) {
+    if (work == Work::all || now >= settle_at_) {
       readers.surface->settle();
       settle_at_ = now + kSettle;
     }
   }
+  const bool film_changed = look_at_film(readers, now);
+  const bool heat_changed = look_at_heat(readers, now);
+  bool regions = false, others = gone;
   for (const PlacedBody& placed : world.bodies()) {
     const std::uint32_t id = placed.body->id;
     const LiveSurface* const surface = readers.surface ? readers.surface->surface(id) : nullptr;
     if (surface == nullptr) continue;
     auto& view = bodies_[id];
     const auto changed = readers.surface->take_changed_bricks(id);
+    regions |= placed.of_region;
+    others |= !view;
     if (!view) {
       // What is at risk goes with the first body, and the finer part of it.
       const bool patient = id == world.bodies().front().body->id || placed.of_region;
       view = std::make_unique<BoneView>(renderer_, patient ? structures_ : nullptr, placed.body->hardness);
+      view->set_film(&film_);
+      view->place(placed.world_from_body);
       view->show(*surface);
-      view->set_wetness(wetness_);
       changed_at_ = now;
     } else if (!changed.empty()) {
       view->update(*surface, changed);
       changed_at_ = now;
-    } else if (now - changed_at_ > kStill) {
-      view->refresh(*surface);
     }
+    if (work == Work::all || now - changed_at_ > kStill) view->refresh(*surface);
     view->place(placed.world_from_body);
+    if (film_changed) view->wet(*surface);
+    if (heat_changed) view->warm(*surface, warm_places_, [&](Vec3 at) { return readers.heat->celsius_at(at); });
   }
+  if (regions && others) shade_regions(world, readers);
   plates_.update(world);
   if (readers.dust) {
     if (!dust_) dust_ = std::make_unique<DustView>(renderer_, world.bodies().front().body->bone.frame().spacing_mm.x);
     dust_->update(readers.dust->dust());
   }
+}
+
+// Finer regions and the bone around them are bodies of their own, but one bone: they shade each other.
+void WorldView::shade_regions(const World& world, const SceneReaders& readers) {
+  std::vector<BoneView*> patient;
+  std::vector<const LiveSurface*> surfaces;
+  for (const PlacedBody& placed : world.bodies()) {
+    const auto view = bodies_.find(placed.body->id);
+    if (view == bodies_.end() || (placed.body->id != world.bodies().front().body->id && !placed.of_region)) continue;
+    patient.push_back(view->second.get());
+    surfaces.push_back(readers.surface->surface(placed.body->id));
+  }
+  for (BoneView* const view : patient) {
+    std::vector<BoneView*> others = patient;
+    std::erase(others, view);
+    view->shade_with(others);
+  }
+  for (std::size_t n = 0; n < patient.size(); ++n) patient[n]->refresh(*surfaces[n]);
+}
+
+// Ten times a second at most: water runs, and its looks change slowly.
+bool WorldView::look_at_film(const SceneReaders& readers, std::chrono::steady_clock::time_point now) {
+  constexpr std::chrono::milliseconds kEvery{100};
+  if (!readers.dust || now < film_at_ || readers.dust->dust().version() == film_of_) return false;
+  film_at_ = now + kEvery;
+  film_of_ = readers.dust->dust().version();
+  return film_.update(readers.dust->dust());
+}
+
+// Five times a second: heat spreads slowly.
+bool WorldView::look_at_heat(const SceneReaders& readers, std::chrono::steady_clock::time_point now) {
+  constexpr std::chrono::milliseconds kEvery{200};
+  if (!readers.heat || now < heat_at_) return false;
+  heat_at_ = now + kEvery;
+  const bool was_warm = !warm_places_.empty();
+  warm_places_.clear();
+  readers.heat->for_warm_places([&](Vec3 centre_mm, double radius_mm) { warm_places_.emplace_back(centre_mm, radius_mm); });
+  return was_warm || !warm_places_.empty();
 }
 
 void WorldView::update_soft(SoftBody& soft) {
@@ -103,12 +149,6 @@ void WorldView::update_soft(SoftBody& soft) {
 
 void WorldView::highlight(std::uint32_t body) {
   for (auto& [id, view] : bodies_) view->highlight(id == body);
-}
-
-void WorldView::set_wetness(double share) {
-  if (share == wetness_) return;
-  wetness_ = share;
-  for (auto& [id, view] : bodies_) view->set_wetness(share);
 }
 
 std::size_t WorldView::triangles() const {

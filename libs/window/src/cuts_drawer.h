@@ -12,9 +12,10 @@
 
 namespace osteo {
 
-/// A structure's surface and the value it goes by.
+/// A structure's surface and the value it goes by; of planned regions kRegion and their number.
 struct CutStructure {
-  std::uint8_t value = 0;
+  static constexpr int kRegion = 256;
+  int value = 0;
   std::shared_ptr<const TriMesh> surface;
 };
 
@@ -33,7 +34,7 @@ struct DrawnCut {
   SliceView view;  ///< of the pixels: no finer than the voxels need, and at least as large as was asked for
   std::vector<std::uint32_t> rgba;
   struct Outline {
-    std::uint8_t value = 0;
+    int value = 0;
     std::vector<CutLine> lines;
   };
   std::vector<Outline> outlines;

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "osteo/base/json_document.h"
 #include "slice_overlay.h"
 
 namespace osteo {
@@ -40,10 +39,7 @@ TriMesh blade_of(const SawCut& cut) {
 
 // Kept in the session: what could be seen is part of what was done.
 void note_look(Rehearsal& rehearsal, const StructuresView::One& s) {
-  const Json note{{"structure", s.value},
-                  {"name", rehearsal.structures()->name_of(s.value)},
-                  {"look", EnumNames<StructureLook>::values[static_cast<std::size_t>(s.look)]}};
-  rehearsal.note("structure", note.dump());
+  rehearsal.note("structure", note_of(s.value, rehearsal.structures()->name_of(s.value), s.look));
 }
 
 bool small_button(const char* words, bool chosen) {
@@ -82,8 +78,28 @@ void CutsPanel::set_case(const std::optional<Image>& scan, const SparseGrid* hu,
   for (const SparseGrid& b : bone) before_.push_back(std::make_shared<const GridSampler>(b));
 }
 
-void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures) {
+CutsLook CutsPanel::look() const {
+  return {control_.hu.width,
+          control_.hu.level,
+          control_.preset(),
+          control_.planes() == CutsControl::Planes::tool,
+          control_.follows(),
+          shown_.tint_removed,
+          regions_ == nullptr || regions_->shown()};
+}
+
+void CutsPanel::take(const CutsLook& look) {
+  if (look.preset >= 0 && look.preset < static_cast<int>(grey_presets().size())) control_.take_preset(look.preset);
+  control_.hu = {look.window_hu, look.level_hu};
+  control_.follow(look.follow);
+  control_.take_planes(look.along_tool ? CutsControl::Planes::tool : CutsControl::Planes::body);
+  shown_.tint_removed = look.removed;
+}
+
+void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsView* regions) {
   structures_ = structures;
+  regions_ = regions;
+  notes_.begin();
   std::vector<CutStructure> outlined;
   if (structures != nullptr) {
     for (const StructuresView::One& s : structures->all()) {
@@ -91,6 +107,8 @@ void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures) {
       if (s.look != StructureLook::solid) note_look(rehearsal, s);  // as the session before left it
     }
   }
+  for (std::size_t r = 0; regions != nullptr && r < regions->all().size(); ++r)
+    outlined.push_back({CutStructure::kRegion + static_cast<int>(r), regions->all()[r].surface});
   double voxel_mm = 0.5;
   rehearsal.look([&](const World& world, SceneReaders&) {
     voxel_mm = world.finest_voxel_mm();
@@ -176,6 +194,7 @@ void CutsPanel::take(Rehearsal& rehearsal) {
 void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
   const TickRecord tick = rehearsal.latest();
   control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), normalized(from_floats(tick.device.axis)));
+  if (const auto note = notes_.next(look(), ImGui::GetTime())) rehearsal.note("cuts", *note);
   if (header_.empty()) return;
   ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
   header(rehearsal);
@@ -221,6 +240,11 @@ void CutsPanel::header(const Rehearsal& rehearsal) {
     ImGui::SameLine();
     const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
     if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
+  }
+  if (regions_ != nullptr) {
+    ImGui::SameLine();
+    if (small_button("plan", regions_->shown())) regions_->show(!regions_->shown());
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("what the procedure wants removed (green) or left (orange); Ctrl-L");
   }
   ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
   ImGui::End();
@@ -278,10 +302,18 @@ void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* plann
       draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(textures_[n])), place(-0.5, -0.5),
                      place(of.width - 0.5, of.height - 0.5));
       for (const DrawnCut::Outline& o : drawn->outlines) {
+        if (o.value >= CutStructure::kRegion) {
+          if (!regions_->shown()) continue;
+          const auto c = region_colour(regions_->all()[static_cast<std::size_t>(o.value - CutStructure::kRegion)].region.forbidden);
+          const ImU32 ink =
+              ImGui::ColorConvertFloat4ToU32({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.9F});
+          for (const CutLine& line : o.lines) on.line(line, ink, 1.2F * scale);
+          continue;
+        }
         const auto& all = structures_->all();
         const auto s = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.value == o.value; });
         if (s == all.end() || s->look == StructureLook::hidden) continue;
-        const auto c = rehearsal.structures()->colour_of(o.value);
+        const auto c = rehearsal.structures()->colour_of(s->value);
         const ImU32 colour = ImGui::ColorConvertFloat4ToU32(
             {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), s->look == StructureLook::clear ? 0.55F : 1.0F});
         for (const CutLine& line : o.lines) on.line(line, colour, 1.6F * scale);

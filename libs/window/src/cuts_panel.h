@@ -5,8 +5,10 @@
 
 #include "cuts_control.h"
 #include "cuts_drawer.h"
+#include "looks.h"
 #include "osteo/bone/saw.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/view/planned_regions.h"
 #include "osteo/view/structures_view.h"
 #include "room_layout.h"
 
@@ -19,8 +21,11 @@ class CutsPanel {
   void release();
   /// CT values (the scan's, else what the case keeps, may be null) and density as the case has it, the finest first.
   void set_case(const std::optional<Image>& scan, const SparseGrid* hu, const std::vector<SparseGrid>& bone);
-  /// A rehearsal has begun. `structures` (may be null) must live until the next call.
-  void begin(Rehearsal& rehearsal, StructuresView* structures);
+  /// A rehearsal has begun. `structures` and `regions` (may be null) must live until the next call.
+  void begin(Rehearsal& rehearsal, StructuresView* structures, RegionsView* regions);
+
+  /// As they looked in another session.
+  void take(const CutsLook& look);
 
   /// Before the rest of a frame: where things lie. In a column one below the other, four up, or, where there is room for neither, not at
   /// all.
@@ -42,10 +47,13 @@ class CutsPanel {
   void list_structures(Rehearsal& rehearsal);
   void take(Rehearsal& rehearsal);
   void upload(DrawnCut cut);
+  [[nodiscard]] CutsLook look() const;
 
   CutsControl control_;
   CutsDrawer drawer_;
   StructuresView* structures_ = nullptr;
+  RegionsView* regions_ = nullptr;
+  CutsNotes notes_;
   std::shared_ptr<const CtValues> ct_, ct_under_mouse_;  // one for each thread
   std::vector<std::shared_ptr<const GridSampler>> before_;
   std::array<unsigned, CutsControl::kCuts> textures_{};

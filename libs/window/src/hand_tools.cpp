@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "keys.h"
 #include "osteo/bone/plate_fit.h"
 #include "osteo/bone/plates.h"
 
@@ -156,6 +157,20 @@ void HandTools::undo(Rehearsal& rehearsal) {
   rehearsal.act(SceneAction::plain(ActionKind::undo));
   piece_ = SceneAction::kNobody;
   note_.clear();
+}
+
+std::string HandTools::how() const {
+  switch (tool_) {
+    case Tool::drill:
+      break;
+    case Tool::saw:
+      return "saw: drag moves it, " + key_name(Command::perform) + " cuts, " + key_name(Command::put_away) + " puts it away";
+    case Tool::piece:
+      return "pieces: " + key_name(Command::perform) + " takes apart, drag moves one";
+    case Tool::plate:
+      return "plate: " + key_name(Command::bring) + " brings it, wheel presses it on, " + key_name(Command::perform) + " fixes it";
+  }
+  return {};
 }
 
 const std::string& HandTools::note(Rehearsal& rehearsal) {

@@ -4,7 +4,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "osteo/window/hand_buttons.h"
 
 namespace osteo {
 
@@ -60,23 +63,57 @@ enum class Command {
   wheel,
   ruler,
   before,
+  pedal,         // drills while it is held; as far down as its button is
+  clutch,        // the mouse moves without the drill
+  wrist_rest,    // the hand moves finely
+  second_mouse,  // the mouse moves the second hand
+  tilt,          // value: 0 left, 1 right, 2 up, 3 down, as the handle's end goes in the picture
+  roll,          // value: 1 clockwise, -1 back
+  straight,      // the handle as the view holds it
+  motion,        // value: 1 coarser, -1 finer
+  burr_speed,    // value: 1 faster, -1 slower
+  other_burr,    // cutting or diamond
+  next_burr,     // value: 1 larger, -1 smaller
+  hand_page,     // of the panel
+  timeline,
+  earlier,
+  later,
+  hints,
+  monitor,       // the nerve monitor's window
+  mute_monitor,  // and its sound
+  regions,       // what the procedure wants removed or left
+  lead,          // the own hand is led by another, or not
 };
+
+/// Keys that are down with another, as GLFW numbers them.
+enum KeyModifier : int { kWithShift = 1, kWithCtrl = 2, kWithAlt = 4 };
 
 struct Key {
   int code;  ///< as GLFW numbers keys
   Command command;
   enum class When { pressed, repeated, held } when = When::pressed;
   int value = 0;
+  int with = 0;  ///< Ctrl or Alt, where it needs one
 };
 [[nodiscard]] std::span<const Key> key_table();
-[[nodiscard]] const Key* find_key(int code);
+/// What a key does with these modifiers; where they mean nothing to it, what it does alone.
+[[nodiscard]] const Key* find_key(int code, int modifiers = 0);
 
 /// The first key that does it, as people call it: "F", "Space", "F10"; empty: none.
 [[nodiscard]] std::string key_name(Command command);
+/// Any key: "F", "Space", "keypad 5"; without a name its number, which has three digits.
+[[nodiscard]] std::string key_word(int code);
+
+/// What a button that a person has given something to do does, as if it were a key.
+struct ButtonCommand {
+  Command command;
+  int value;
+};
+[[nodiscard]] ButtonCommand command_of(HandFunction function);
 
 /// A line of the window's help, and the commands it tells of; none: of the mouse.
 struct HelpLine {
-  const char* keys;
+  const char* keys;  ///< empty: the text is the heading of the lines that follow
   const char* text;
   std::vector<Command> commands;
 };
@@ -87,7 +124,12 @@ struct HelpLine {
 class Keyboard {
  public:
   enum class Event { released = 0, pressed = 1, repeated = 2 };  // as GLFW numbers them
-  void on(int code, Event event, bool shift = false);
+  /// `code`: a key, or another button that `bound` knows; `modifiers`: KeyModifier.
+  void on(int code, Event event, int modifiers = 0);
+  /// What a person has given keys and buttons to do goes before the table; null: nothing. Must outlive the keyboard.
+  void bind(const HandButtons* bound) { bound_ = bound; }
+  /// Nothing is down any more: another window has the keys now.
+  void let_go() { down_.clear(); }
   struct Press {
     Command command;
     int value;
@@ -99,8 +141,15 @@ class Keyboard {
   [[nodiscard]] bool held(Command command) const;
 
  private:
+  // By code: of two keys for one thing, one may be let go.
+  struct Down {
+    int code;
+    Command command;
+  };
+  const HandButtons* bound_ = nullptr;
   std::vector<Press> presses_;
-  std::vector<Command> down_, since_, held_;
+  std::vector<Down> down_;
+  std::vector<Command> since_, held_;
 };
 
 }  // namespace osteo

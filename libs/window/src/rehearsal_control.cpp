@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstdio>
 #include <new>
+#include <numbers>
 
 #include "osteo/base/error.h"
 #include "osteo/grid/brick_places.h"
+#include "osteo/haptics/hand_tuning.h"
 
 namespace osteo {
 
@@ -44,7 +46,10 @@ void RehearsalControl::measure(const World& world) {
 bool RehearsalControl::begin(bool from_case, bool save_first) {
   failure_.reset();
   leading_.reset();
-  ran_ = latched_ = sucking_ = washing_ = false;
+  lead_pause_.end();
+  ran_ = latched_ = false;
+  second_.rest();
+  second_.follow();
   const bool saved = !save_first || guarded([&] { actions_.save(); });
   if (!saved) lost_ = failure_;
   const bool begun = saved && guarded([&] {
@@ -73,9 +78,11 @@ void RehearsalControl::reset() {
 
 bool RehearsalControl::end() {
   leading_.reset();
+  lead_pause_.end();
   const bool saved = guarded([&] { actions_.save(); });
   if (!saved) lost_ = failure_;
-  ran_ = latched_ = sucking_ = washing_ = false;
+  ran_ = latched_ = false;
+  second_.rest();
   return saved;
 }
 
@@ -101,9 +108,8 @@ void RehearsalControl::watch() {
 
 // --- the hand
 
-// A drill is held from the right; a plate lies flat against what one looks at.
 Vec3 RehearsalControl::wanted_axis() const {
-  return plate_in_hand() ? view_.forward * -1 : normalized(view_.right * 0.62 + view_.up * 0.45 - view_.forward * 0.64);
+  return handle_.axis(view_);
 }
 
 // Where the hand is; before the first tick, where it will be.
@@ -130,11 +136,27 @@ void RehearsalControl::move_hand(Vec3 to_mm) {
   if (!leading_) goal_.position_mm = to_mm;
 }
 
-void RehearsalControl::push_hand(double deeper_mm) {
-  if (!leading_) goal_.position_mm += view_.forward * deeper_mm;
+bool RehearsalControl::moves_by_itself() const {
+  return dynamic_cast<const MouseDevice*>(&rehearsal().device()) == nullptr;
 }
 
-// The handle follows the view, as far as bone lets it.
+void RehearsalControl::drag_hand(const MouseStep& step) {
+  if (!leading_) goal_.position_mm = motion_.moved(goal_.position_mm, step);
+}
+
+void RehearsalControl::push_hand(double deeper_mm) {
+  if (!leading_) goal_.position_mm += view_.forward * (deeper_mm * motion_.factor());
+}
+
+void RehearsalControl::tilt_hand(double right_rad, double up_rad) {
+  if (!leading_ && !motion_.clutch) handle_.tilt(right_rad, up_rad);
+}
+
+void RehearsalControl::roll_hand(double rad) {
+  if (!leading_ && !motion_.clutch) handle_.roll(rad);
+}
+
+// The handle follows the view and the hand, as far as bone lets it.
 void RehearsalControl::turn_handle(double seconds) {
   constexpr double kRadPerS = 4;
   const Vec3 wanted = wanted_axis();
@@ -150,14 +172,17 @@ void RehearsalControl::send_goal(double seconds) {
     return;
   }
   auto* const mouse = dynamic_cast<MouseDevice*>(&device);
+  const auto pedal_of = [&](double down) { return static_cast<std::uint8_t>(std::lround(255 * burr_share * down)); };
+  const std::uint8_t pedal = pedal_of(latched_ ? 1 : held_);
   if (mouse == nullptr) {  // it moves by itself, and drills by a pedal of its own where it has one
-    if (actions_.press) actions_.press(latched_ || held_);
+    const double scale = (motion_.rest ? motion_.rest_share : 1) / motion_.one_to;
+    if (actions_.tune) actions_.tune({scale, motion_.clutch, pedal, pedal_of(1)});
     return;
   }
   turn_handle(seconds);
   goal_.axis = to_floats(axis_);
   goal_.tool = static_cast<std::uint8_t>(tool_);
-  goal_.pedal = latched_ || held_ ? 255 : 0;
+  goal_.pedal = pedal;
   mouse->set_goal(goal_);
 }
 
@@ -167,6 +192,8 @@ void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
     return;
   }
   leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
+  // Pulled aside it would not get there.
+  if (lead_pause_.begin()) say("the drill finds its way: your hand is let go until it is there");
   latched_ = false;
   wait_for_release_ = true;
 }
@@ -176,15 +203,20 @@ void RehearsalControl::lift() {
 }
 
 void RehearsalControl::bring(Vec3 direction) {
-  std::optional<BoneHit> hit;
-  rehearsal().look([&](const World& world, SceneReaders&) {
-    hit = bone_on_ray(world, view_.eye_mm, direction, length(centre_mm_ - view_.eye_mm) + 4 * radius_mm_);
-  });
+  const std::optional<BoneHit> hit = bone_seen(direction);
   if (!hit) {
     say("no bone under the mouse");
     return;
   }
   lead(hit->at_mm, direction);
+}
+
+std::optional<BoneHit> RehearsalControl::bone_seen(Vec3 direction) const {
+  std::optional<BoneHit> hit;
+  rehearsal().look([&](const World& world, SceneReaders&) {
+    hit = bone_on_ray(world, view_.eye_mm, direction, length(centre_mm_ - view_.eye_mm) + 4 * radius_mm_);
+  });
+  return hit;
 }
 
 // No way was free of structures at risk.
@@ -205,6 +237,7 @@ void RehearsalControl::go_on_leading() {
   };
   const auto waiting = [&](const FreeWays& ways) { return ways.waiting(towards_eye(), wanted_axis()); };
   if (leading_->stage == Leading::Stage::letting_go) {
+    if (lead_pause_.pulled()) return;
     const std::uint64_t tick = rehearsal().latest().tick;
     if (!leading_->quiet_tick) leading_->quiet_tick = tick;
     if (tick <= *leading_->quiet_tick) return;
@@ -213,11 +246,12 @@ void RehearsalControl::go_on_leading() {
     if (leading_->seen_mm) {
       const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
+      const std::string what = plate_in_hand() ? "plate" : "drill";
       char far[80];
-      std::snprintf(far, sizeof far, "the drill gets no nearer than %.0f mm this way", gap);
-      leading_->done = a.way.put ? "the drill was shut in; it was taken out and set down there"
+      std::snprintf(far, sizeof far, "the %s gets no nearer than %.0f mm this way", what.c_str(), gap);
+      leading_->done = a.way.put ? "the " + what + " was shut in; it was taken out and set down there"
                        : gap > 6 ? far
-                                 : "drill brought to the bone";
+                                 : what + " brought to the bone";
       if (a.past_structures) leading_->done += kPastStructures;
       go(Leading::Stage::on_the_way, a.way, a.end);
     } else {
@@ -236,7 +270,10 @@ void RehearsalControl::go_on_leading() {
     way.count = 1;
     go(Leading::Stage::put, way, to);
   } else {
-    say(leading_->done);
+    if (leading_->seen_mm) motion_.meet();
+    // Who took up the saw meanwhile has to know how it is used.
+    const std::string how = leading_->seen_mm ? std::string() : tools_.how();
+    say((how.empty() ? leading_->done : how) + (lead_pause_.end() ? "; your hand is led again" : ""));
     leading_.reset();
   }
 }
@@ -258,10 +295,36 @@ void RehearsalControl::take_burr_of(int diameter_mm) {
   take_burr(burr_index(burr().kind, diameter_mm, burr().shape));
 }
 
+// One size up or down; behind the last of them the other end.
+void RehearsalControl::next_burr(int by) {
+  constexpr int kSizes = 7;
+  const int now = static_cast<int>(std::lround(burr().diameter_mm));
+  take_burr_of((now - 1 + by + kSizes) % kSizes + 1);
+}
+
+void RehearsalControl::set_burr_share(int by) {
+  burr_share = std::clamp(burr_share + 0.25 * by, 0.25, 1.0);
+  char text[64];
+  std::snprintf(text, sizeof text, "burr at most at %.0f %% of its speed", 100 * burr_share);
+  say(text);
+}
+
 // --- a frame
 
 bool RehearsalControl::command(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
-  if (tools_.key(press.command, rehearsal(), view_)) return true;
+  const HandTools::Tool before = tools_.tool();
+  // Where the mouse points, or the middle of the picture: there it is seen.
+  if (press.command == Command::saw && before != HandTools::Tool::saw) {
+    if (const auto hit = bone_seen(direction.value_or(view_.forward))) {
+      SawCut cut = tools_.cut();
+      cut.at_mm = hit->at_mm;
+      tools_.set_cut(cut);
+    }
+  }
+  if (tools_.key(press.command, rehearsal(), view_)) {
+    if (tools_.tool() != before && !tools_.how().empty()) say(tools_.how());
+    return true;
+  }
   switch (press.command) {
     case Command::deeper:
       push_hand(0.25);
@@ -303,7 +366,34 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       reset();
       return true;
     case Command::second_hand:
-      take_next_second();
+      say(second_.take_next(rehearsal()));
+      return true;
+    case Command::tilt: {
+      constexpr double kStep = 3 * std::numbers::pi / 180;
+      const double across[] = {-kStep, kStep, 0, 0}, up[] = {0, 0, kStep, -kStep};
+      tilt_hand(across[press.value], up[press.value]);
+      return true;
+    }
+    case Command::roll:
+      roll_hand(press.value * 3 * std::numbers::pi / 180);
+      return true;
+    case Command::straight:
+      if (!leading_) handle_.straight();
+      return true;
+    case Command::motion: {
+      motion_.step(press.value);
+      say("motion of the hand 1:" + std::to_string(motion_.one_to) +
+          (motion_.one_to == 1 && motion_.parted() ? "; " + key_name(Command::bring) + " brings the drill under the mouse again" : ""));
+      return true;
+    }
+    case Command::burr_speed:
+      set_burr_share(press.value);
+      return true;
+    case Command::other_burr:
+      take_burr(burr().kind == BurrKind::cutting ? BurrKind::diamond : BurrKind::cutting);
+      return true;
+    case Command::next_burr:
+      next_burr(press.value);
       return true;
     default:
       return false;
@@ -311,15 +401,19 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
 }
 
 void RehearsalControl::hold(const HandInput& input) {
-  // A button that was held when the hand was led away does not drill where it arrives.
-  if (!input.pressed && !leading_) wait_for_release_ = false;
-  held_ = input.pressed && !wait_for_release_ && input.on_bone && tools_.tool() == HandTools::Tool::drill;
+  motion_.clutch = input.clutch;
+  motion_.rest = input.wrist_rest;
+  handle_.take(plate_in_hand());
+  second_works_ = input.second_hand && input.pressed && input.on_bone;
+  const bool pressed = input.pressed && !input.second_hand;
+  // What was held when the hand was led away does not drill where it arrives.
+  if (!pressed && !(input.drill > 0) && !leading_) wait_for_release_ = false;
+  const double down = std::max(pressed && input.on_bone ? 1.0 : 0.0, std::clamp(input.drill, 0.0, 1.0));
+  held_ = wait_for_release_ || tools_.tool() != HandTools::Tool::drill ? 0 : down;
   if (input.pad && !leading_) {
     const PadMotion& pad = *input.pad;
-    goal_.position_mm +=
-        (view_.right * pad.right_mm_s + view_.up * pad.up_mm_s + view_.forward * pad.deeper_mm_s) * std::min(input.seconds, 0.1);
-    if (!pad.drill && !held_) wait_for_release_ = false;
-    held_ = held_ || (pad.drill && !wait_for_release_);
+    goal_.position_mm += (view_.right * pad.right_mm_s + view_.up * pad.up_mm_s + view_.forward * pad.deeper_mm_s) *
+                         (std::min(input.seconds, 0.1) * motion_.factor());
   }
   // Who takes up the saw or a piece lets go of the drill: it does not stay in the bone.
   const bool in_hand = tools_.in_hand();
@@ -327,52 +421,41 @@ void RehearsalControl::hold(const HandInput& input) {
   in_hand_ = in_hand;
   go_on_leading();
   send_goal(input.seconds);
+  tell_of_tools();
 }
 
-// What the second hand may hold, in turn; the first: nothing.
-static constexpr const char* kSecond[] = {"", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm"};
+// What came of saw, pieces and plates, or why nothing did: once, wherever the panel is.
+void RehearsalControl::tell_of_tools() {
+  const std::string& note = tools_.note(rehearsal());
+  if (note == told_of_tools_) return;
+  told_of_tools_ = note;
+  if (!note.empty()) say(note);
+}
 
-void RehearsalControl::take_next_second() {
-  if (rehearsal().hands() < 2) {
-    say("there is no second hand: --dust, or --second-device");
-    return;
-  }
-  second_ = (second_ + 1) % std::size(kSecond);
-  Device& device = rehearsal().device(1);
-  if (dynamic_cast<MouseDevice*>(&device) == nullptr) {
-    second_ = std::max<std::size_t>(second_, 1);
-    device.set_tool(static_cast<std::uint8_t>(instrument_index(kSecond[second_])));
-  }
-  say(second_ == 0 ? "second hand: nothing" : std::string("second hand: ") + kSecond[second_]);
+void RehearsalControl::drag_second(Vec3 by_mm) {
+  std::string said;
+  static_cast<void>(second_.move(rehearsal(), by_mm * motion_.factor(), said));
+  if (!said.empty() && said != message_) say(said);
+}
+
+Vec3 RehearsalControl::second_mm() const {
+  if (second_.placed_mm()) return *second_.placed_mm();
+  return rehearsal().hands() > 1 ? from_floats(rehearsal().latest(1).device.position_mm) : goal_.position_mm;
 }
 
 void RehearsalControl::wash(bool suck, bool wash) {
-  second_empty_ = false;
-  auto* const hand = rehearsal().hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal().device(1)) : nullptr;
-  if (hand == nullptr) return;
-  sucking_ = suck;
-  washing_ = wash;
-  const bool works = suck || wash;
-  second_empty_ = !works && second_ == 0;
-  const TickRecord tick = rehearsal().latest();
-  HandGoal goal;
-  goal.tool = static_cast<std::uint8_t>(instrument_index(suck   ? kSecond[1]
-                                                         : wash ? kSecond[2]
-                                                                : kSecond[std::max<std::size_t>(second_, 1)]));
-  goal.pedal = works ? 255 : 0;
-  goal.axis = to_floats(normalized(view_.right - view_.forward));
-  const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
-  goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + view_.right * gap;
-  // Held ready beside it, or put away.
-  if (!works) goal.position_mm += second_ > 0 ? view_.right * 8 - view_.forward * 6 : view_.right * 30 - view_.forward * 40;
-  hand->set_goal(goal);
+  second_.hold(rehearsal(), view_, suck, wash, second_works_, handle_.left());
 }
 
 // --- what is told
 
-void RehearsalControl::say(const std::string& text) {
+void RehearsalControl::tell(const std::string& text) {
   message_ = text;
   message_until_ = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+}
+
+void RehearsalControl::say(const std::string& text) {
+  tell(text);
   if (Rehearsal* const running = actions_.rehearsal()) running->note("message", text);
 }
 

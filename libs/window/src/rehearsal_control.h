@@ -8,16 +8,22 @@
 #include "gamepad.h"
 #include "hand_tools.h"
 #include "keys.h"
+#include "lead_pause.h"
+#include "mouse_hand.h"
 #include "osteo/scene/free_ways.h"
 #include "osteo/window/rehearsal_window.h"
+#include "second_hand.h"
 
 namespace osteo {
 
 /// What was done with hands since the last frame, as far as the drill is concerned.
 struct HandInput {
-  double seconds = 0;            ///< since then
-  bool pressed = false;          ///< the button that drills is down
-  bool on_bone = false;          ///< and the mouse is over the view
+  double seconds = 0;    ///< since then
+  bool pressed = false;  ///< the button that drills is down
+  bool on_bone = false;  ///< and the mouse is over the view
+  double drill = 0;      ///< how far down what else drills is: pedals, triggers, keys; 0 to 1
+  bool clutch = false, wrist_rest = false;
+  bool second_hand = false;      ///< the mouse, with that button, is the second hand's
   std::optional<PadMotion> pad;  ///< of a gamepad, where there is one
 };
 
@@ -53,12 +59,25 @@ class RehearsalControl {
   [[nodiscard]] Vec3 towards_eye() const { return normalized(view_.eye_mm - centre_mm_); }
 
   // --- the hand
-  void move_hand(Vec3 to_mm);        ///< where the mouse is
-  void push_hand(double deeper_mm);  ///< along the view
-  void bring(Vec3 direction);        ///< to the bone on a ray from the eye
-  void lift();                       ///< out of the bone
-  void take_burr(int tool);          ///< index in burr_library(); not on the way
-  void take_burr(BurrKind kind);     ///< the same but for this
+  void move_hand(Vec3 to_mm);
+  void drag_hand(const MouseStep& step);  ///< as the mouse did, by motion()
+  void push_hand(double deeper_mm);       ///< of the hand, along the view
+  /// The handle's end goes so far in the picture; the burr stays.
+  void tilt_hand(double right_rad, double up_rad);
+  void roll_hand(double rad);
+  /// What the person chose.
+  [[nodiscard]] HandMotion& motion() { return motion_; }
+  [[nodiscard]] const HandMotion& motion() const { return motion_; }
+  [[nodiscard]] HandHold& handle() { return handle_; }
+  [[nodiscard]] const HandHold& handle() const { return handle_; }
+  /// A device moves it, not the mouse.
+  [[nodiscard]] bool moves_by_itself() const;
+  double burr_share = 1;       ///< of the full speed, at a pedal that is all the way down: 0.25 to 1
+  void bring(Vec3 direction);  ///< to the bone on a ray from the eye
+  [[nodiscard]] std::optional<BoneHit> bone_seen(Vec3 direction) const;  ///< the first on a ray from the eye
+  void lift();                                                           ///< out of the bone
+  void take_burr(int tool);                                              ///< index in burr_library(); not on the way
+  void take_burr(BurrKind kind);                                         ///< the same but for this
   void take_burr(BurrShape shape);
   void take_burr_of(int diameter_mm);
   [[nodiscard]] int tool() const { return tool_; }
@@ -78,16 +97,17 @@ class RehearsalControl {
   /// The second hand, where no device moves it: what it holds is beside the burr, a sucker or water while one of the two is asked for,
   /// else out of the way.
   void wash(bool suck, bool wash);
-  [[nodiscard]] bool sucking() const { return sucking_; }
-  [[nodiscard]] bool washing() const { return washing_; }
-
-  /// The next of sucker, irrigator, probe and nothing; a device's hand always holds one of the three.
-  void take_next_second();
+  [[nodiscard]] bool sucking() const { return second_.sucking(); }
+  [[nodiscard]] bool washing() const { return second_.washing(); }
+  /// So far as the mouse went at its depth.
+  void drag_second(Vec3 by_mm);
+  [[nodiscard]] Vec3 second_mm() const;
   /// Nothing is in it, and nothing of it is to be drawn.
-  [[nodiscard]] bool second_hand_empty() const { return second_empty_; }
+  [[nodiscard]] bool second_hand_empty() const { return second_.empty(); }
 
   // --- what is told
-  void say(const std::string& text);  ///< also a note of the session
+  void say(const std::string& text);   ///< also a note of the session
+  void tell(const std::string& text);  ///< no note: it may name a file, and so a patient
   /// The last thing said.
   [[nodiscard]] const std::string& message() const { return message_; }
   /// What to show now; empty: nothing.
@@ -111,9 +131,12 @@ class RehearsalControl {
   [[nodiscard]] bool outside() const;
   [[nodiscard]] FreeWays free_ways(bool whole_tool) const;
   void turn_handle(double seconds);
+  void next_burr(int by);
+  void set_burr_share(int by);
   void send_goal(double seconds);
   void lead(std::optional<Vec3> seen_mm, Vec3 forward);
   void go_on_leading();
+  void tell_of_tools();
   [[nodiscard]] const Burr& burr() const { return burr_library()[static_cast<std::size_t>(tool_)]; }
 
   WindowActions actions_;
@@ -124,13 +147,17 @@ class RehearsalControl {
   Vec3 centre_mm_{};
   double radius_mm_ = 100;
   HandGoal goal_;
-  Vec3 axis_{0, 0, 1};  // of the handle, on its way to what the view wants
+  Vec3 axis_{0, 0, 1};  // of the handle, on its way to what is wanted
+  HandMotion motion_;
+  HandHold handle_;
+  SecondHand second_;
   std::optional<Leading> leading_;
+  LeadPause lead_pause_{actions_};
   std::optional<Error> failure_, lost_;
-  bool ran_ = false, sucking_ = false, washing_ = false, latched_ = false, held_ = false;
-  bool wait_for_release_ = false, in_hand_ = true, second_empty_ = false;
-  std::size_t second_ = 0;  // what the second hand holds: place in kSecond
-  std::string message_;
+  bool ran_ = false, latched_ = false, second_works_ = false;
+  double held_ = 0;  // how far down
+  bool wait_for_release_ = false, in_hand_ = true;
+  std::string message_, told_of_tools_;
   std::chrono::steady_clock::time_point message_until_{};
 };
 

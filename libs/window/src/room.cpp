@@ -96,7 +96,12 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
   }
   switch (c) {
     case Command::help:
-      help_ = !help_;
+      help_.show(!help_.open());
+      return true;
+    case Command::earlier:
+    case Command::later:
+      if (!help_.open()) return false;
+      help_.turn(c == Command::later ? 1 : -1);
       return true;
     case Command::layout:
       wanted_ = next_layout(wanted_);
@@ -111,9 +116,14 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
       shell_.toggle_full_screen();
       person_.values.full_screen = shell_.full_screen();
       return true;
+    case Command::hand_page:
     case Command::panel_keys:
       keys_in_panel_ = true;
-      if (layout_.panel.empty() && layout_.tray.empty()) keys_in_panel_ = false;
+      if (layout_.panel.empty() && (layout_.tray.empty() || c == Command::hand_page)) keys_in_panel_ = false;
+      if (c == Command::hand_page) {
+        if (!keys_in_panel_) control.say("the panel is folded away: " + key_name(Command::layout) + " brings it");
+        hand_page_ = keys_in_panel_;
+      }
       if (keys_in_panel_) control.say("keys move in the panel: arrows, Space; Esc gives them back");
       return true;
     case Command::wheel: {
@@ -145,8 +155,8 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
       undone_ = true;
       return false;
     case Command::put_away:
-      if (help_) {
-        help_ = false;
+      if (help_.open()) {
+        help_.show(false);
         return true;
       }
       if (ruler_.on()) {
@@ -191,20 +201,26 @@ HandFacts Room::hand_facts(const RehearsalControl& control, const SoundOut& soun
 
 void Room::see(const RoomScene& scene) {
   StepFacts facts;
+  std::uint64_t undone = 0;
   Rehearsal& rehearsal = scene.control.rehearsal();
   facts.removed_mm3 = rehearsal.removed_mm3();
   rehearsal.look([&](const World& world, SceneReaders& readers) {
     facts.sawn_mm3 = readers.tools.sawn_mm3();
     facts.undo_steps = world.undo_steps();
+    undone = readers.tools.undone();
     facts.fixtures = world.fixtures().size();
     facts.dust = readers.dust != nullptr;
+    if (facts.dust) facts.sucked_mm3 = readers.dust->dust().totals().sucked_mm3;
   });
-  // Asked for, and then done.
-  facts.undone = undone_ && facts.undo_steps < undo_steps_;
-  if (facts.undone) undone_ = false;
+  // Asked for, and then done. Not told by the steps there are: a burr that runs out in bone given back makes another at once.
+  facts.undone = undone_ && undone > times_undone_;
+  times_undone_ = undone;
+  if (facts.undone) {
+    undone_ = false;
+    scene.control.say("taken back");
+  }
   undo_steps_ = facts.undo_steps;
-  facts.sucking = scene.control.sucking();
-  facts.eye_distance_mm = length(scene.control.view().eye_mm - scene.control.centre_mm());
+  facts.magnification = scene.magnification;
   steps_.see(facts);
 }
 
@@ -223,10 +239,10 @@ void Room::draw(const RoomScene& scene) {
   if (keys_in_panel_ && !ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
   if (!layout_.panel.empty()) draw_panel(scene);
   if (!layout_.tray.empty()) draw_tray(layout_.tray, hand, pressed_);
-  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick), control.told());
+  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.told());
   draw_marks(scene);
   if (writing_) draw_note_field(control);
-  if (help_) draw_help(help_, shell_.width(), shell_.height(), [&] { draw_steps(true); });
+  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_, true); });
   if (wheel_.open()) {
     const float e = em();
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) wheel_.point((io.MousePos.x - wheel_.x()) / e, (io.MousePos.y - wheel_.y()) / e);
@@ -256,7 +272,7 @@ void Room::draw_panel(const RoomScene& scene) {
   draw_deeds(hand, pressed_);
   ImGui::Separator();
   if (person_.values.first_steps && steps_.next() >= 0) {
-    draw_steps(false);
+    draw_first_steps(steps_, false);
     ImGui::Separator();
   }
   scene.draw_camera();
@@ -265,6 +281,7 @@ void Room::draw_panel(const RoomScene& scene) {
   scene.draw_tools();
   ImGui::Separator();
   draw_sound(scene.sound);
+  if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
   if (ImGui::CollapsingHeader("Case and machine")) {
@@ -282,32 +299,6 @@ void Room::draw_panel(const RoomScene& scene) {
   ImGui::EndChild();
   draw_apart(pressed_);
   ImGui::End();
-}
-
-void Room::draw_steps(bool in_full) {
-  ImGui::TextDisabled("the first five minutes");
-  const int next = steps_.next();
-  int n = 0;
-  for (const Step& step : steps_.steps()) {
-    const float e = em();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    ImDrawList* const draw = ImGui::GetWindowDrawList();
-    // A ticked box, an empty one, a crossed one.
-    draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F}, im_colour32(palette::kFaint), 0, 0, e / 12);
-    if (step.done) {
-      draw->AddLine({at.x + e * 0.2F, at.y + e * 0.5F}, {at.x + e * 0.4F, at.y + e * 0.75F}, im_colour32(palette::kYellow), e / 6);
-      draw->AddLine({at.x + e * 0.4F, at.y + e * 0.75F}, {at.x + e * 0.85F, at.y + e * 0.1F}, im_colour32(palette::kYellow), e / 6);
-    } else if (!step.possible) {
-      draw->AddLine({at.x + e * 0.1F, at.y + e * 0.85F}, {at.x + e * 0.8F, at.y + e * 0.15F}, im_colour32(palette::kFaint), e / 12);
-    }
-    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + e * 1.2F);
-    // Only the next one in full: the list keeps its place.
-    const std::string words = n == next || in_full ? step.words : step.words.substr(0, step.words.find(':'));
-    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? palette::kText : palette::kFaint));
-    ImGui::TextWrapped("%s", words.c_str());
-    ImGui::PopStyleColor();
-    ++n;
-  }
 }
 
 void Room::draw_note_field(RehearsalControl& control) {
@@ -404,23 +395,26 @@ EndChoice Room::end_choice(Command command) {
   }
 }
 
-EndChoice Room::draw_end(const EndFacts& facts) {
+EndChoice Room::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
   ImGuiIO& io = ImGui::GetIO();
   io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
   begin_fixed("end", layout_.page);
   const float e = em();
   fitted_text(ImGui::GetWindowDrawList(),
               {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e}, 1.6F * e,
-              palette::kText, "The session is over, and saved");
+              palette::kText, facts.past ? "A session, looked at again" : "The session is over, and saved");
   ImGui::Dummy({0, 1.8F * e});
   EndChoice choice = EndChoice::none;
   const auto button = [&](const char* words, EndChoice of) {
     if (ImGui::Button(words, {ImGui::GetContentRegionAvail().x, 0})) choice = of;
   };
-  button("again, from the whole bone (R)", EndChoice::again);
-  button("go on from here (F5)", EndChoice::resume);
+  if (!facts.past) {
+    button("again, from the whole bone (R)", EndChoice::again);
+    button("go on from here (F5)", EndChoice::resume);
+  }
   button("another case (Home)", EndChoice::another);
   button("close (Q)", EndChoice::close);
+  findings();
   ImGui::Separator();
   if (ImGui::BeginTable("done", 2)) {
     ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "help_page.h"
 #include "marks.h"
 #include "osteo/window/person_settings.h"
 #include "osteo/window/sound_out.h"
@@ -34,10 +35,14 @@ struct RoomScene {
   TickRecord tick;
   MachineFacts machine;
   double pixels_per_mm = 1;  ///< where one looks at
+  double magnification = 1;
   /// A point of the world in pixels of the window; nothing behind the eye.
   std::function<std::optional<std::array<float, 2>>(Vec3)> project;
   std::function<void()> draw_camera;  ///< the microscope: into the panel
   std::function<void()> draw_tools;   ///< saw, pieces, plates: into the panel
+  /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
+  std::function<void(bool show)> draw_hand;
+  std::optional<WarmthNow> warmth;  ///< where the scene has heat
 };
 
 enum class EndChoice { none, again, resume, another, close };
@@ -51,8 +56,8 @@ class Room {
   [[nodiscard]] const RoomLayout& layout() const { return layout_; }
   [[nodiscard]] Layout wanted() const { return wanted_; }
   /// Mouse and keys are for something in front of the bone.
-  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || help_; }
-  [[nodiscard]] bool help() const { return help_; }
+  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || help_.open(); }
+  [[nodiscard]] const HelpPage& help() const { return help_; }
   [[nodiscard]] bool asking() const { return asking_; }
   [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
   [[nodiscard]] bool keys_in_panel() const { return keys_in_panel_; }
@@ -80,15 +85,14 @@ class Room {
   void draw(const RoomScene& scene);
   /// A caption over the picture, in the frame of a screenshot.
   void draw_caption(const RoomScene& scene);
-  /// In review. `now`: a key's choice.
-  [[nodiscard]] EndChoice draw_end(const EndFacts& facts);
+  /// In review. `findings`: drawn into the page.
+  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const std::function<void()>& findings);
   /// What a key means on that page.
   [[nodiscard]] static EndChoice end_choice(Command command);
 
  private:
   void draw_panel(const RoomScene& scene);
   void draw_marks(const RoomScene& scene);
-  void draw_steps(bool in_full);
   void draw_note_field(RehearsalControl& control);
   void answer(int answer, RehearsalControl& control);
   void see(const RoomScene& scene);
@@ -103,11 +107,14 @@ class Room {
   FirstSteps steps_;
   Ruler ruler_;
   PinnedNotes notes_;
-  bool help_ = false, asking_ = false, keys_in_panel_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  HelpPage help_;
+  bool asking_ = false, keys_in_panel_ = false, before_ = false, undone_ = false, write_focus_ = false;
   std::size_t undo_steps_ = 0;
+  std::uint64_t times_undone_ = 0;
   std::optional<Vec3> writing_;  // where a note is pinned
   std::string note_text_;
   int note_answer_ = 0;  // 1: kept, -1: not
+  bool hand_page_ = false;
 };
 
 }  // namespace osteo

@@ -71,6 +71,26 @@ RoomLayout lay_out(Layout wanted, int width, int height, float em, float column_
   return out;
 }
 
+ScreenBox take_strip(RoomLayout& room, float high) {
+  if (room.shown == Layout::review) return {};
+  const bool four = !room.cuts[0].empty();
+  const float top = room.view.y, bottom = four ? room.cuts[1].bottom() : room.view.bottom();
+  const float left = room.view.x, right = four ? room.cuts[0].right() : room.view.right();
+  high = std::floor(std::min(high, (bottom - top) / 2));
+  if (!(high > 0)) return {};
+  if (four) {
+    const float upper = std::floor((bottom - top - high) / 2), lower = bottom - top - high - upper;
+    room.view.height = room.cuts[0].height = upper;
+    for (ScreenBox* const cut : {&room.cuts[1], &room.cuts[2]}) {
+      cut->y = top + upper;
+      cut->height = lower;
+    }
+  } else {
+    room.view.height -= high;
+  }
+  return {left, bottom - high, right - left, high};
+}
+
 double automatic_scale(double told_by_monitor, int width, int height) {
   return std::clamp(std::max(told_by_monitor, std::min(width / 1920.0, height / 1080.0)), 1.0, 4.0);
 }

@@ -42,6 +42,10 @@ struct RoomLayout {
 /// `column_width`: as the person dragged it, within limits; 0: by the window.
 [[nodiscard]] RoomLayout lay_out(Layout wanted, int width, int height, float em_pixels, float column_width = 0);
 
+/// A strip above the state, as high as asked for but never more than half the pictures' height, for something that is shown for a while:
+/// the pictures make room, all else stays. Empty in review.
+[[nodiscard]] ScreenBox take_strip(RoomLayout& room, float high);
+
 /// Height of text at scale 1.
 inline constexpr double kTextPixels = 16;
 /// A monitor's scale as the system tells it; where that is 1 on a large framebuffer, which many systems leave so, by its size: text keeps

@@ -79,7 +79,7 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
 
   const ScreenBox near = column(3);
   const NearnessLook& look = look_of(f.nearness);
-  head(near, f.distance.empty() ? std::string("structures at risk") : f.structure);
+  head(near, (f.distance.empty() ? std::string("structures at risk") : f.structure) + (f.warmth.empty() ? "" : ", " + f.warmth));
   if (f.nearness == Nearness::touched)  // as large as it can be
     draw->AddRectFilled({near.x - pad / 2, near.y}, {near.right(), near.bottom()}, im_colour32(look.colour));
   const Colour ink = f.nearness == Nearness::touched ? Colour{0, 0, 0} : look.colour;
@@ -91,7 +91,7 @@ void draw_state(const ScreenBox& box, const StateFacts& f, const std::string& me
   const float below = box.bottom() - line - pad * 0.4F, small = std::min(e, below);
   const float time = all * 0.3F;
   fitted_text(draw, {box.x + pad, line, time - pad, below}, small, palette::kText, f.time + "   " + f.removed);
-  const bool warns = !f.warning.empty();
+  const bool warns = warning_is_told(f, message);
   const std::string& told = warns ? f.warning : message;
   const float at = box.x + pad + time;
   if (warns)
@@ -211,41 +211,30 @@ void draw_apart(Pressed& pressed) {
   ImGui::PopStyleColor();
 }
 
-void draw_help(bool& open, int width, int height, const std::function<void()>& steps) {
-  const auto w = static_cast<float>(width), h = static_cast<float>(height);
-  const float e = em(), column = 30 * e;
-  const int columns = std::clamp(static_cast<int>((w - 3 * e) / column), 1, 2);
-  const float wide = std::min(w - e, column * static_cast<float>(columns) + 2 * e), high = std::min(h - e, 60 * e);
-  ImGui::SetNextWindowPos({std::floor((w - wide) / 2), std::floor((h - high) / 2)});
-  ImGui::SetNextWindowSize({wide, high});
-  ImGui::Begin("Mouse and keys", &open, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
-  if (steps) {
-    steps();
-    ImGui::Separator();
-  }
-  const std::vector<HelpLine>& lines = help_lines();
-  if (ImGui::BeginTable("keys", 2 * columns, ImGuiTableFlags_None)) {
-    for (int c = 0; c < columns; ++c) {
-      ImGui::TableSetupColumn("key", ImGuiTableColumnFlags_WidthFixed, 10 * e);
-      ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch);
+void draw_first_steps(const FirstSteps& steps, bool all_in_full) {
+  ImGui::TextDisabled("the first five minutes");
+  const int next = steps.next();
+  const bool beside = ImGui::GetContentRegionAvail().x > 70 * em();
+  if (beside && !ImGui::BeginTable("steps", 2)) return;
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const float e = em();
+  for (int n = 0; n < static_cast<int>(steps.steps().size()); ++n) {
+    const Step& step = steps.steps()[static_cast<std::size_t>(n)];
+    if (!step.possible) continue;  // is not asked for
+    if (beside) ImGui::TableNextColumn();
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    // A ticked box, or an empty one.
+    draw->AddRect({at.x + e * 0.1F, at.y + e * 0.15F}, {at.x + e * 0.8F, at.y + e * 0.85F}, im_colour32(palette::kFaint), 0, 0, e / 12);
+    if (step.done) {
+      draw->AddLine({at.x + e * 0.2F, at.y + e * 0.5F}, {at.x + e * 0.4F, at.y + e * 0.75F}, im_colour32(palette::kYellow), e / 6);
+      draw->AddLine({at.x + e * 0.4F, at.y + e * 0.75F}, {at.x + e * 0.85F, at.y + e * 0.1F}, im_colour32(palette::kYellow), e / 6);
     }
-    const std::size_t rows = (lines.size() + static_cast<std::size_t>(columns) - 1) / static_cast<std::size_t>(columns);
-    for (std::size_t r = 0; r < rows; ++r) {
-      ImGui::TableNextRow();
-      for (int c = 0; c < columns; ++c) {
-        const std::size_t n = static_cast<std::size_t>(c) * rows + r;
-        if (n >= lines.size()) continue;
-        ImGui::TableSetColumnIndex(2 * c);
-        ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kSkyBlue));
-        ImGui::TextWrapped("%s", lines[n].keys);
-        ImGui::PopStyleColor();
-        ImGui::TableSetColumnIndex(2 * c + 1);
-        ImGui::TextWrapped("%s", lines[n].text);
-      }
-    }
-    ImGui::EndTable();
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + e * 1.2F);
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(n == next ? palette::kText : palette::kFaint));
+    ImGui::TextWrapped("%s", (n == next || all_in_full ? step.words : step.name()).c_str());
+    ImGui::PopStyleColor();
   }
-  ImGui::End();
+  if (beside) ImGui::EndTable();
 }
 
 void draw_wheel(const ToolWheel& wheel) {

@@ -1,13 +1,13 @@
 // What the window shows beside its pictures, drawn from plain values. Private to libs/window; ImGui, no GL. What a button does is what its
 // key does: it gives the same command.
 #pragma once
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "keys.h"
 #include "room_layout.h"
 #include "state_facts.h"
+#include "steps.h"
 #include "tool_wheel.h"
 
 namespace osteo {
@@ -29,7 +29,8 @@ struct Pressed {
 };
 
 /// Two rows whose fields never change places: tool and speed, force, bone under the burr, the nearest structure; below, what was removed,
-/// the time and a line of words. `message`: the last thing said; a warning goes before it.
+/// the time and a line of words. `message`: the last thing said, empty after a while; see
+/// warning_is_told().
 void draw_state(const ScreenBox& box, const StateFacts& facts, const std::string& message);
 /// Buttons of instruments one below the other.
 void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed);
@@ -38,8 +39,9 @@ void draw_burr(const HandFacts& hand, Pressed& pressed);
 /// Into the current window: what one does, and, apart from it, what cannot be taken back.
 void draw_deeds(const HandFacts& hand, Pressed& pressed);
 void draw_apart(Pressed& pressed);
-/// Mouse and keys, from the table of keys, in as many columns as fit; scrolls where the window is small. `steps`: drawn above it.
-void draw_help(bool& open, int width, int height, const std::function<void()>& steps = {});
+/// Into the current window: the list of the first five minutes; the next of them in full, or all. Two beside each other where there is
+/// room.
+void draw_first_steps(const FirstSteps& steps, bool all_in_full);
 void draw_wheel(const ToolWheel& wheel);
 /// A question in the middle of the window. 1: yes, -1: no, 0: not yet.
 [[nodiscard]] int draw_question(int width, int height, const std::string& title, const std::string& text, const std::string& yes);

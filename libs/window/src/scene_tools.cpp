@@ -16,6 +16,7 @@
 #include "osteo/bone/world_mesh.h"
 #include "osteo/view/actors.h"
 #include "osteo/view/plate_view.h"
+#include "ui_style.h"
 
 namespace osteo {
 namespace {
@@ -76,9 +77,32 @@ void tell_collision(double mm) {
 
 }  // namespace
 
+void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw) {
+  if (tools.tool() != Tool::saw) return;
+  const SawCut& cut = tools.cut();
+  const auto middle = project(cut.at_mm);
+  if (!middle) return;
+  // As far as the cut goes, or as can be told from here: what lies behind the eye has no place in the picture.
+  const double half_mm = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
+  const float e = em();
+  draw->PushClipRect({area.x, area.y}, {area.right(), area.bottom()});
+  for (const double way : {-1.0, 1.0}) {
+    for (double mm = half_mm; mm > 1; mm /= 2) {
+      const auto end = project(cut.at_mm + normalized(cut.along) * (way * mm));
+      if (!end) continue;
+      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, IM_COL32(0, 0, 0, 160), e / 4);
+      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, im_colour32(palette::kSkyBlue), e / 8);
+      break;
+    }
+  }
+  draw->AddCircleFilled({(*middle)[0], (*middle)[1]}, e * 0.35F, IM_COL32(0, 0, 0, 160));
+  draw->AddCircle({(*middle)[0], (*middle)[1]}, e * 0.35F, im_colour32(palette::kSkyBlue), 16, e / 8);
+  draw->PopClipRect();
+}
+
 SceneTools::SceneTools(vtkRenderer* renderer) : renderer_(renderer), hand_plate_(renderer) {
   plane_data_ = vtkSmartPointer<vtkPolyData>::New();
-  plane_ = vtkSmartPointer<vtkActor>::New();
+  plane_ = make_late_actor(Late::all);
   vtkNew<vtkPolyDataMapper> mapper;
   mapper->SetInputData(plane_data_);
   plane_->SetMapper(mapper);

@@ -2,17 +2,29 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
+#include <array>
+#include <functional>
+#include <optional>
+
 #include "hand_tools.h"
 #include "osteo/view/plate_view.h"
+#include "room_layout.h"
 
+struct ImDrawList;
 class vtkActor;
 class vtkPolyData;
 class vtkRenderer;
 
 namespace osteo {
 
+/// A point of the world in pixels of the window; nothing behind the eye.
+using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
+/// The saw's line over the picture, within `area`: seen edge on its plane is as thin as the blade, and bone hides it. No-op without a saw.
+void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw);
+
 class SceneTools {
  public:
+  /// After what else is drawn: what one sees through is drawn in the order in which it is added.
   explicit SceneTools(vtkRenderer* renderer);
   ~SceneTools();
   SceneTools(const SceneTools&) = delete;

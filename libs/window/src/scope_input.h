@@ -13,7 +13,7 @@ namespace osteo {
 /// Of a frame. Pixels, y downwards.
 struct ScopeMouse {
   double x = 0, y = 0, dx = 0, dy = 0, wheel = 0;
-  bool right = false, middle = false;  ///< dragged
+  bool right = false, middle = false;  ///< down
   bool ctrl = false, shift = false;
 };
 

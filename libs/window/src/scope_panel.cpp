@@ -67,7 +67,7 @@ void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene&
   ImGui::Text("%s", scope_words(scope.view()).c_str());
   if (!ImGui::TreeNode("microscope", "Microscope")) return;
   ScopeControl& control = scope.control;
-  ImGui::PushItemWidth(-90);  // room for their names
+  ImGui::PushItemWidth(-5.5F * ImGui::GetFontSize());  // room for their names
   if (ImGui::Button("Camera back (Backspace)", {-1, 0})) static_cast<void>(control.undo());
   auto m = static_cast<float>(scope.view().magnification);
   if (ImGui::SliderFloat("x", &m, 0.5F, 40, "%.1f", ImGuiSliderFlags_Logarithmic))

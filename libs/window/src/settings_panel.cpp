@@ -45,7 +45,7 @@ void draw_posture(Rehearsal& rehearsal) {
     changed = true;
   }
   auto turned = static_cast<float>(now.head_turned_deg);
-  ImGui::PushItemWidth(90);
+  ImGui::PushItemWidth(5 * ImGui::GetFontSize());
   if (now.posture != Posture::sitting && ImGui::SliderFloat("head turned", &turned, -90, 90, "%.0f deg")) changed = true;
   ImGui::PopItemWidth();
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("where dust and water fall to; positive: the face towards the patient's left");

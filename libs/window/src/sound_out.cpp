@@ -12,9 +12,11 @@ namespace osteo {
 struct SoundOut::Playing {
   // What the card's thread looks at; exchanged while it is kept out.
   std::unique_ptr<LiveSound> live;
+  MonitorSound* monitor = nullptr;
   AudioOut card{[this](std::span<float> out) {
     if (live) {
       live->fill(out);
+      if (monitor != nullptr) monitor->mix(out);
     } else {
       std::fill(out.begin(), out.end(), 0.0F);
     }
@@ -45,6 +47,12 @@ void SoundOut::play() {
   }
   const AudioOut::Pause pause(playing_->card);
   std::swap(playing_->live, next);
+  playing_->monitor = monitor_;
+}
+
+void SoundOut::mix_in(MonitorSound* monitor) {
+  monitor_ = monitor;
+  play();
 }
 
 void SoundOut::turn(bool on) {

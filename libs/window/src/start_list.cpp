@@ -133,7 +133,7 @@ std::optional<StartChoice> StartList::open() {
     look_into(entry.folder);
     return std::nullopt;
   }
-  return take(entry.folder);
+  return take_one(entry.folder);
 }
 
 std::optional<StartChoice> choice_of(const fs::path& path, std::string& why) {
@@ -151,7 +151,27 @@ std::optional<StartChoice> choice_of(const fs::path& path, std::string& why) {
   return std::nullopt;
 }
 
-std::optional<StartChoice> StartList::take(const fs::path& path) {
+std::optional<StartChoice> choice_of(const std::vector<fs::path>& paths, std::string& why) {
+  why.clear();
+  for (const fs::path& path : paths) {
+    std::string other;
+    const std::optional<StartChoice> choice = choice_of(path, other);
+    if (choice) {
+      why.clear();
+      return choice;
+    }
+    if (why.empty()) why = other;
+  }
+  return std::nullopt;
+}
+
+std::optional<StartChoice> StartList::take(const std::vector<fs::path>& paths) {
+  std::string why;
+  if (const auto choice = choice_of(paths, why)) return choice;
+  return paths.empty() ? std::nullopt : take_one(paths.front());
+}
+
+std::optional<StartChoice> StartList::take_one(const fs::path& path) {
   std::string why;
   const std::optional<StartChoice> choice = choice_of(path, why);
   if (choice) return choice;

@@ -40,14 +40,15 @@ class StartList {
   /// Opens the entry: a folder is looked into; a case or a session is a choice.
   std::optional<StartChoice> open();
   void up();  ///< to the folder above
-  /// What was dropped onto the window.
-  std::optional<StartChoice> take(const std::filesystem::path& path);
+  /// What was dropped onto the window, or chosen in a dialog: of several things the first that is a case or a session.
+  std::optional<StartChoice> take(const std::vector<std::filesystem::path>& paths);
 
   [[nodiscard]] const std::string& message() const { return message_; }
   void say(std::string text) { message_ = std::move(text); }
   void forget_recent();
 
  private:
+  std::optional<StartChoice> take_one(const std::filesystem::path& path);
   void list();
   void look_into(const std::filesystem::path& folder);
   std::vector<std::filesystem::path> recent_;

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <utility>
 
+#include "file_dialog.h"
 #include "osteo/base/json_document.h"
 #include "start_list.h"
 #include "ui_style.h"
@@ -78,8 +80,11 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
   StartList list(person.cases(), options.folder.empty() ? std::filesystem::current_path() : options.folder);
   list.say(options.message);
   std::optional<StartChoice> choice;
-  bool open = false, close = false, follow = true;
-  shell.on_key = [&](int key, int action, bool) {
+  shell.mirror_mouse = person.values.mirror_mouse;
+  bool open = false, close = false, follow = true, ask = false;
+  FileDialog dialog;
+  const bool dialogs = FileDialog::there();
+  shell.on_key = [&](int key, int action, int) {
     if (action == 0) return;
     if (key == kDown || key == kUp) list.move(key == kDown ? 1 : -1);
     if (key == kPageDown || key == kPageUp) list.move(key == kPageDown ? 10 : -10);
@@ -89,6 +94,7 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
       shell.toggle_full_screen();
       person.values.full_screen = shell.full_screen();
     }
+    if (key == 'O' && dialogs) ask = true;
     if (key == 'Q' || key == kEscape) close = true;
     follow = true;
   };
@@ -96,7 +102,12 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
   std::uint64_t pictures = 0;
   while (!choice && !close && !shell.closing() && !(options.stop && options.stop())) {
     if (!shell.poll()) continue;
-    for (const auto& path : shell.take_dropped()) choice = list.take(path);
+    if (const auto dropped = shell.take_dropped(); !dropped.empty()) choice = list.take(dropped);
+    if (std::exchange(ask, false)) list.say(dialog.is_open() ? list.message() : dialog.open(list.folder()));
+    if (const auto answer = dialog.poll()) {
+      list.say(answer->why);
+      if (answer->chosen) choice = list.take({*answer->chosen});
+    }
     shell.new_frame();
     const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
     const float e = em(), wide = std::min(w, 60 * e);
@@ -118,6 +129,10 @@ std::optional<StartChoice> run_start_page(WindowShell& shell, PersonSettings& pe
     if (ImGui::Button("open (Enter)")) open = true;
     ImGui::SameLine();
     if (ImGui::Button("the folder above (Backspace)")) list.up();
+    if (dialogs) {
+      ImGui::SameLine();
+      if (ImGui::Button("dialog (O)")) ask = true;
+    }
     ImGui::SameLine();
     if (ImGui::Button("close (Q)")) close = true;
     ImGui::Checkbox("remember cases", &person.values.remember_cases);

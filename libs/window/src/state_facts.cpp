@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "osteo/scene/heat_reader.h"
+
 namespace osteo {
 namespace {
 
@@ -65,8 +67,28 @@ StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures,
   return f;
 }
 
-StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick) {
+bool warning_is_told(const StateFacts& facts, const std::string& message) {
+  return !facts.warning.empty() && !(facts.lasts && !message.empty());
+}
+
+void tell_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {
+  const auto of = warmth.structures_c.find(static_cast<std::uint8_t>(tick.structure));
+  if (tick.structure == 0 || structures == nullptr) {
+    f.warmth = text_of("bone up to %.0f C", warmth.bone_c);
+  } else {
+    f.warmth = text_of("%.1f C", of == warmth.structures_c.end() ? 37.0 : of->second);
+  }
+  if (structures == nullptr || f.alarm) return;
+  const auto worst = std::max_element(warmth.structures_c.begin(), warmth.structures_c.end(),
+                                      [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (worst == warmth.structures_c.end() || worst->second < 47) return;
+  f.warning = structures->name_of(worst->first) + text_of(" is at %.0f C: stop, and rinse", worst->second);
+  f.alarm = worst->second >= kCoagulatedC;
+}
+
+StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const WarmthNow* warmth) {
   StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
+  if (warmth != nullptr) tell_warmth(f, *warmth, tick, rehearsal.structures());
   f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
   if (rehearsal.soft() != nullptr) f.removed += text_of(", tissue %.1f", rehearsal.tissue_mm3());
   // A recording in trouble comes before everything: nothing of what follows would be kept.
@@ -77,6 +99,7 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick) {
   }
   if (!f.warning.empty()) return f;
   const Burr* const burr = instrument_of(tick.device.tool).as_burr();
+  f.lasts = true;
   if (burr != nullptr) f.warning = too_small_for_voxels(*burr, rehearsal.finest_voxel_mm());
   if (f.warning.empty() && rehearsal.pieces() > 1) f.warning = text_of("the bone is in %d pieces", rehearsal.pieces());
   return f;

@@ -8,30 +8,29 @@ namespace osteo {
 namespace {
 
 enum : std::size_t { kDrill, kUndo, kSuck, kZoom, kCut, kPlate };
-constexpr double kDrilledMm3 = 0.5, kZoomed = 0.1;
+constexpr double kDrilledMm3 = 0.5, kSuckedMm3 = 0.05, kZoomed = 0.1;
 
 }  // namespace
 
 FirstSteps::FirstSteps() {
   const auto key = [](Command c) { return key_name(c); };
-  steps_ = {{"Drill: point at the bone, " + key(Command::bring) + " brings the drill; hold the left button, wheel: deeper"},
+  steps_ = {{"Drill: point at the bone, " + key(Command::bring) + " brings the drill; hold the left button, wheel away from you: deeper"},
             {"Undo: " + key(Command::undo) + " takes the last stroke back"},
-            {"Suck: hold " + key(Command::suck) + " while there is dust"},
+            {"Suck: drill on, and hold " + key(Command::suck) + ": a sucker beside the burr takes the dust"},
             {"Zoom: Ctrl-wheel; right drag turns the view"},
-            {"Cut: " + key(Command::saw) + " takes the saw, drag it over the bone, " + key(Command::perform) + " cuts"},
-            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) + " brings it, wheel presses it on, " +
+            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) + " cuts"},
+            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) + " brings it where you point, wheel presses it on, " +
              key(Command::perform) + " fixes it"}};
 }
 
 void FirstSteps::see(const StepFacts& now) {
   steps_[kSuck].possible = now.dust;
-  if (!now.dust) steps_[kSuck].words = "Suck: this session has no dust (osteo rehearse CASE --dust)";
   if (!first_) first_ = now;
   const auto tick = [&](std::size_t step, bool so) { steps_[step].done = steps_[step].done || so; };
   tick(kDrill, now.removed_mm3 - first_->removed_mm3 > kDrilledMm3);
   tick(kUndo, now.undone);
-  tick(kSuck, now.dust && now.sucking);
-  tick(kZoom, std::abs(now.eye_distance_mm / first_->eye_distance_mm - 1) > kZoomed);
+  tick(kSuck, now.sucked_mm3 - first_->sucked_mm3 > kSuckedMm3);
+  tick(kZoom, std::abs(now.magnification / first_->magnification - 1) > kZoomed);
   tick(kCut, now.sawn_mm3 > first_->sawn_mm3);
   tick(kPlate, now.fixtures > first_->fixtures);
 }

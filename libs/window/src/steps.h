@@ -11,14 +11,15 @@ struct StepFacts {
   double removed_mm3 = 0, sawn_mm3 = 0;
   std::size_t undo_steps = 0, fixtures = 0;
   bool undone = false;  ///< something was taken back in this picture
-  bool sucking = false;
-  bool dust = false;  ///< the scene has any: else nothing can be sucked off
-  double eye_distance_mm = 0;
+  bool dust = false;    ///< the scene has any: else nothing can be sucked off
+  double sucked_mm3 = 0;
+  double magnification = 1;
 };
 
 struct Step {
-  std::string words;  ///< what to do, with its keys
+  std::string words;  ///< what to do, with its keys; its name up to the colon
   bool possible = true, done = false;
+  [[nodiscard]] std::string name() const { return words.substr(0, words.find(':')); }
 };
 
 class FirstSteps {

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <future>
 #include <mutex>
+#include <utility>
 
 #include "open_window.h"
 #include "room_layout.h"
@@ -36,8 +37,10 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
       if (larger || smaller) return shell->change_scale(larger ? 1 : -1);
       if (key == GLFW_KEY_0 || key == GLFW_KEY_KP_0) return shell->change_scale(0);
     }
-    if (shell->on_key) shell->on_key(key, action, (modifiers & GLFW_MOD_SHIFT) != 0);
+    if (shell->on_key) shell->on_key(key, action, modifiers & (GLFW_MOD_SHIFT | GLFW_MOD_CONTROL | GLFW_MOD_ALT));
   });
+  glfwSetWindowFocusCallback(
+      window_, [](GLFWwindow* w, int has) { static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->attended_ = has != GLFW_FALSE; });
   glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
     auto* const shell = static_cast<WindowShell*>(glfwGetWindowUserPointer(w));
     shell->dropped_.insert(shell->dropped_.end(), paths, paths + count);
@@ -51,6 +54,13 @@ WindowShell::WindowShell(const ShellOptions& options) : fixed_scale_(options.sca
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
+#if IMGUI_VERSION_NUM >= 18700
+  glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int which, int action, int modifiers) {
+    const bool mirror = static_cast<WindowShell*>(glfwGetWindowUserPointer(w))->mirror_mouse;
+    if (mirror && which <= GLFW_MOUSE_BUTTON_RIGHT) which = GLFW_MOUSE_BUTTON_RIGHT - which;
+    ImGui_ImplGlfw_MouseButtonCallback(w, which, action, modifiers);
+  });
+#endif
   ImGui_ImplOpenGL3_Init("#version 150");
   glfwGetFramebufferSize(window_, &width_, &height_);
   apply_scale();
@@ -132,6 +142,10 @@ bool WindowShell::closing() const {
 void WindowShell::new_frame() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
+#if IMGUI_VERSION_NUM < 18700
+  // It asks for states, not for events.
+  if (mirror_mouse) std::swap(ImGui::GetIO().MouseDown[0], ImGui::GetIO().MouseDown[1]);
+#endif
   ImGui::NewFrame();
 }
 

@@ -21,12 +21,46 @@ struct RoomState {
        ruler = false;
   double ruler_mm = 0;
   std::size_t notes = 0;
-  int steps_done = 0;
-  std::array<float, 4> view{};  // x, y, width, height
+  std::string hint;  // that is shown
+  bool hints = false;
+  int findings = -1;  // -1: not known yet
+  bool timeline = false, playing = false;
+  double review_s = 0, review_mm3 = 0;  // the time that is shown, and the bone there is then
+  std::vector<std::string> steps_done;  // of the first five minutes, by name
+  std::string next_step;
+  int help_page = 0, help_pages = 1;  // as it was drawn last
+  std::array<float, 4> view{};        // x, y, width, height
+};
+
+/// Of the hand.
+struct HandState {
+  int one_to = 1;
+  bool clutch = false, wrist_rest = false, left_handed = false;
+  std::string listening, row;  // for what; of the page that the keys are on
+  double burr_share = 1, tilted_rad = 0;
+  Vec3 second_mm, axis{0, 0, 1};  // axis: as it is wanted
+};
+
+/// Of the nerve monitor; no channels: there is none.
+struct MonitorState {
+  std::size_t channels = 0, events = 0;
+  double seconds = 0;
+  bool shown = false, muted = false;
+};
+
+/// Of who leads and who takes part; title empty: nobody.
+struct TutorState {
+  std::string title, invitation;
+  std::size_t links = 0, heard = 0;
+  bool guiding = false;
+  double pull = 0, apart_mm = -1;
 };
 
 struct WindowState {
+  TutorState tutor;
   RoomState room;
+  HandState motion;
+  MonitorState monitor;
   std::uint64_t pictures = 0;  // turns of the loop
   std::uint64_t drawn = 0;     // pictures of the scene
   bool at_rest = false;
@@ -50,6 +84,7 @@ struct WindowState {
   int width = 0, height = 0;
   TickRecord tick;
   double removed_mm3 = 0;
+  double hottest_c = 0;  // 0: the scene has no heat
   std::size_t bodies = 0, fixtures = 0, undo_steps = 0;
   std::vector<Vec3> places_mm;
 };

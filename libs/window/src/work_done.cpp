@@ -59,6 +59,7 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   }
   out.warnings = session.warnings;
   out.folder = session.folder;
+  out.past = session.past;
   return out;
 }
 

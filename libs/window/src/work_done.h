@@ -37,6 +37,7 @@ struct EndFacts {
   std::vector<EndLine> lines;
   std::vector<std::string> warnings;
   std::filesystem::path folder;
+  bool past = false;  ///< it was over before the window opened
 };
 [[nodiscard]] EndFacts end_facts(const SessionFacts& session, const WorkDone& work);
 

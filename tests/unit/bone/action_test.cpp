@@ -57,6 +57,9 @@ TEST(Action, RowsSayWhatTheWorldDoes) {
       case ActionKind::grip:
         a = SceneAction::grip(plate);
         break;
+      case ActionKind::guide:
+        a.item = 1;  // leads hand 0
+        break;
       case ActionKind::attach:
         a = lying;
         break;

@@ -73,6 +73,48 @@ TEST(World, UndoReadsNothingThatItGaveBack) {
   EXPECT_EQ(w.hash(), whole);
 }
 
+// Bricks of `now` that lie where one of `before` does and are the same memory.
+std::size_t shared_bricks(const BrickGrid& now, const BrickGrid& before) {
+  std::size_t shared = 0;
+  for (std::uint32_t b = 0; b < now.brick_count(); ++b) {
+    const Ijk o = now.brick_coordinate(b);
+    shared += now.shares_brick(b, before, before.find_brick(o.i, o.j, o.k)) ? 1 : 0;
+  }
+  return shared;
+}
+
+TEST(World, ActionsCopyOnlyTheBricksThatTheyChangeAndNeverWriteOldOnes) {
+  World w(bar(0.25, 0.4));
+  const auto old = w.bodies()[0].body;
+  const std::string was = old->bone.hash();
+  const std::size_t bricks = old->bone.brick_count();
+  const auto sawn = w.act(SceneAction::saw(kMiddle));
+  const auto& after_saw = w.bodies()[0].body->bone;
+  ASSERT_EQ(sawn.changed.size(), 1u);
+  EXPECT_EQ(shared_bricks(after_saw, old->bone), bricks - sawn.changed[0].bricks.size());
+  EXPECT_LT(sawn.changed[0].bricks.size(), bricks / 4);
+  EXPECT_EQ(old->bone.hash(), was);
+
+  const auto whole = w.bodies()[0].body;
+  const std::string before_split = whole->bone.hash();
+  ASSERT_TRUE(w.act(SceneAction::split(1)).done);
+  ASSERT_EQ(w.bodies().size(), 2u);
+  BrickGrid &first = w.bodies()[0].body->bone, &second = w.bodies()[1].body->bone;
+  EXPECT_GT(shared_bricks(first, whole->bone) + shared_bricks(second, whole->bone), bricks * 3 / 4);
+  EXPECT_EQ(whole->bone.hash(), before_split);
+  // No brick has two living owners: what is drilled in one piece cannot be felt in the other.
+  EXPECT_EQ(shared_bricks(second, first), 0u);
+
+  ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.bodies()[0].body->bone.hash(), before_split);
+  EXPECT_GT(shared_bricks(w.bodies()[0].body->bone, whole->bone), bricks * 3 / 4);
+  // A copy of the world has everything for itself.
+  const World copy = w.copy();
+  EXPECT_EQ(shared_bricks(copy.bodies()[0].body->bone, w.bodies()[0].body->bone), 0u);
+  ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
+  EXPECT_EQ(w.bodies()[0].body->bone.hash(), was);
+}
+
 TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
   World w(bar(0.5, 0));
   for (const double x : {-5.0, 5.0}) w.act(SceneAction::saw({{x, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1}));

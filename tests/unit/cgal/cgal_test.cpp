@@ -4,6 +4,7 @@
 
 #include "meshes.h"
 #include "osteo/base/error.h"
+#include "osteo/distance/solid.h"
 #include "osteo/mesh/mesh_info.h"
 
 namespace osteo {
@@ -38,16 +39,16 @@ TEST(Cgal, ClosesHolesUpToASize) {
   const std::uint64_t open = summarize(mesh_of(holed)).holes;
   ASSERT_EQ(open, 2u);
   CgalRepairReport r;
-  const TriangleSoup closed = repaired_by_cgal(holed, 200, false, r);
+  const TriangleSoup closed = holes_closed(holed, 200, r);
   EXPECT_EQ(r.holes_filled, open);
   EXPECT_EQ(r.holes_left, 0u);
   EXPECT_TRUE(summarize(mesh_of(closed)).watertight);
   EXPECT_NEAR(enclosed_volume_mm3(mesh_of(closed)), volume, 0.02 * volume);
-  const TriangleSoup small_only = repaired_by_cgal(holed, 3, false, r);
+  const TriangleSoup small_only = holes_closed(holed, 3, r);
   EXPECT_EQ(r.holes_left, 1u);
   EXPECT_EQ(r.holes_filled, 1u) << "of this call alone";
   EXPECT_FALSE(summarize(mesh_of(small_only)).watertight);
-  static_cast<void>(repaired_by_cgal(holed, 0, false, r));
+  static_cast<void>(holes_closed(holed, 0, r));
   EXPECT_EQ(r.holes_filled, 0u);
   EXPECT_EQ(r.holes_left, open);
 }
@@ -65,11 +66,46 @@ TEST(Cgal, TakesOutSelfIntersections) {
     if (p.x < -9.7) p.x = 14;
   }
   CgalRepairReport r;
-  const TriangleSoup mended = repaired_by_cgal(s, 200, true, r);
+  const TriangleSoup mended = intersections_resolved(s, r);
   ASSERT_GT(r.self_intersections_before, 0u);
   EXPECT_EQ(r.self_intersections_after, self_intersections(mended).size());
   EXPECT_EQ(r.self_intersections_after, 0u);
   EXPECT_TRUE(summarize(mesh_of(mended)).watertight);
+}
+
+TEST(Cgal, ResolvesOverlapsWithoutLosingBodies) {
+  CgalRepairReport r;
+  // Two boxes that cross: 64 + 27 - what they share.
+  const TriangleSoup crossed = test::joined(test::box({0, 0, 0}, {4, 4, 4}), test::box({3, 3, 3}, {6, 6, 6}));
+  TriangleSoup one = intersections_resolved(crossed, r);
+  EXPECT_GT(r.self_intersections_before, 0u);
+  EXPECT_EQ(r.self_intersections_after, 0u);
+  EXPECT_TRUE(check(mesh_of(one)).watertight());
+  EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), 64 + 27 - 1, 1e-4);
+  // Two that touch in a part of a face: one body, the wall gone.
+  one = intersections_resolved(test::joined(test::box({0, 0, 0}, {4, 4, 4}), test::box({4, 1, 1}, {8, 3, 3})), r);
+  EXPECT_EQ(r.self_intersections_after, 0u);
+  EXPECT_TRUE(check(mesh_of(one)).watertight());
+  EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), 64 + 16, 1e-4);
+  EXPECT_NEAR(area_mm2(mesh_of(one)), 96 + 2 * 4 + 4 * 8 - 2 * 4, 1e-3);
+  // A head and a body joined by overlap, as statues are: nothing is lost.
+  const TriangleSoup statue = test::joined(test::sphere(10, 3), test::sphere(4, 3, {0, 0, 12}));
+  const double expected = inside_volume_mm3(statue);
+  one = intersections_resolved(statue, r);
+  EXPECT_EQ(r.self_intersections_after, 0u);
+  EXPECT_TRUE(summarize(mesh_of(one)).watertight);
+  EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), expected, 0.01 * expected);
+  double top = 0;
+  for (const Vec3& p : one.points_mm) top = std::max(top, p.z);
+  EXPECT_NEAR(top, 16, 0.1);
+  // Three through one place, a body whose faces coincide with another's, and one that has nothing to resolve.
+  const auto three = test::joined(test::joined(test::box({-1, -1, -5}, {1, 1, 5}), test::box({-1, -5, -1}, {1, 5, 1})),
+                                  test::box({-5, -1, -1}, {5, 1, 1}));
+  one = intersections_resolved(three, r);
+  EXPECT_EQ(r.self_intersections_after, 0u);
+  EXPECT_NEAR(enclosed_volume_mm3(mesh_of(one)), 3 * 40 - 2 * 8, 1e-4);
+  EXPECT_TRUE(check(mesh_of(one)).watertight());
+  EXPECT_EQ(intersections_resolved(test::sphere(3, 2), r).triangles.size(), test::sphere(3, 2).triangles.size());
 }
 
 TEST(Cgal, MeshesABallWithinItsBounds) {
@@ -93,6 +129,25 @@ TEST(Cgal, MeshesABallWithinItsBounds) {
   const TetMesh again = tets_by_cgal(ball, o);
   ASSERT_EQ(again.tets.size(), m.tets.size());
   EXPECT_TRUE(std::equal(m.tets.begin(), m.tets.end(), again.tets.begin()));
+}
+
+TEST(Cgal, LeavesCavitiesEmptyAndFillsBodiesInBodies) {
+  CgalMeshOptions o;
+  o.cell_mm = 1.5;
+  o.optimise = false;
+  const double large = enclosed_volume_mm3(mesh_of(test::sphere(6, 3))), small = enclosed_volume_mm3(mesh_of(test::sphere(3, 3)));
+  EXPECT_NEAR(volume_mm3(tets_by_cgal(test::joined(test::sphere(6, 3), test::turned(test::sphere(3, 3))), o)), large - small, 0.05 * large);
+  EXPECT_NEAR(volume_mm3(tets_by_cgal(test::joined(test::sphere(6, 3), test::sphere(3, 3)), o)), large, 0.05 * large);
+  o.cell_mm = 1e-20;
+  try {
+    static_cast<void>(tets_by_cgal(test::sphere(6, 2), o));
+    ADD_FAILURE();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::resources);
+  }
+  o.cell_mm = 0.05;
+  o.limits.seconds = 0.5;
+  EXPECT_THROW(static_cast<void>(tets_by_cgal(test::sphere(6, 3), o)), Error);
 }
 
 TEST(Cgal, SaysWhatItCannotMesh) {

@@ -341,6 +341,122 @@ TEST(Lending, ACapDrivesTheCamera) {
   for (const int end : {puck_end.load(), hand_end.load()}) ::close(end);
 }
 
+// --- as the person wants it
+
+TEST(Tuning, AnotherScaleBeginsWhereTheToolIs) {
+  WorkspaceMap map({100, 0, 0}, Mat3{}, 2);
+  const Vec3 start = map.update({0, 0, 0}, false);
+  EXPECT_EQ(start, (Vec3{100, 0, 0}));
+  const Vec3 before = map.update({3, 0, 0}, false);
+  EXPECT_EQ(before, (Vec3{106, 0, 0}));
+  map.rescale(0.25);
+  EXPECT_EQ(map.update({3, 0, 0}, false), before) << "nothing jumps";
+  EXPECT_EQ(map.update({3, 4, 0}, false), before + Vec3(0, 4 * 2 * 0.25, 0));
+  EXPECT_EQ(map.scale(), 0.5);
+  map.rescale(0.25);  // the same is no new beginning
+  EXPECT_EQ(map.update({3, 8, 0}, false), before + Vec3(0, 8 * 2 * 0.25, 0));
+  map.rescale(1);
+  const Vec3 back = map.update({3, 8, 0}, false);
+  EXPECT_EQ(map.update({4, 8, 0}, false), back + Vec3(2, 0, 0));
+}
+
+// One end of a device that says what the test wants.
+struct PluggedEnd {
+  std::atomic<int> far{-1};
+  HidLink::Open opener() {
+    return [this](std::string&) -> std::unique_ptr<HidPort> {
+      int ends[2];
+      if (far >= 0 || ::socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends) != 0) return nullptr;
+      far = ends[1];
+      return open_socket(ends[0]);
+    };
+  }
+  ~PluggedEnd() {
+    if (far >= 0) ::close(far);
+  }
+  // Says it again and again until it has come to something.
+  bool says(std::initializer_list<int> report, const std::function<bool()>& so) {
+    std::vector<std::byte> raw;
+    for (const int b : report) raw.push_back(static_cast<std::byte>(b));
+    for (int i = 0; i < 5000; ++i) {
+      if (far >= 0) static_cast<void>(::send(far, raw.data(), raw.size(), MSG_NOSIGNAL));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (so()) return true;
+    }
+    return false;
+  }
+};
+
+TEST(Tuning, ACapMovesByTheScaleAndNotAtAllWithTheClutch) {
+  PluggedEnd end;
+  SpaceMouseDevice hand(end.opener(), HandGoal{}, Mat3{}, nullptr);
+  // Full deflection to the right, and button 2.
+  ASSERT_TRUE(end.says({1, 350 & 255, 350 >> 8, 0, 0, 0, 0}, [&] { return hand.motion().push && hand.motion().push->x > 0.99; }));
+  ASSERT_TRUE(end.says({3, 2}, [&] { return hand.read(0, 1e-3, {}).buttons == 2; }));
+  // The spring hand behind it has caught up after a second.
+  const auto mm_per_s = [&](const HandTuning& t) {
+    hand.tune(t);
+    for (int i = 0; i < 1000; ++i) static_cast<void>(hand.read(0, 1e-3, {}));
+    const float at = hand.read(0, 1e-3, {}).position_mm[0];
+    DeviceSample s;
+    for (int i = 0; i < 500; ++i) s = hand.read(0, 1e-3, {});
+    return static_cast<double>(s.position_mm[0] - at) / 0.5;
+  };
+  HandTuning t;
+  EXPECT_NEAR(mm_per_s(t), 60, 0.2);
+  t.scale = 0.25;
+  EXPECT_NEAR(mm_per_s(t), 15, 0.2);
+  t.clutch = true;
+  EXPECT_NEAR(mm_per_s(t), 0, 0.01);
+  // Button 2 drills only when it is told to, as hard as it is told to.
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 0);
+  t.drill_buttons = 2;
+  t.full = 128;
+  hand.tune(t);
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 128);
+  t.pedal = 200;  // the window's keys press harder
+  hand.tune(t);
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 200);
+  hand.lend(true);
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 0);
+}
+
+TEST(Tuning, SwitchesDoWhatTheyWereGivenToDo) {
+  PluggedEnd cap, foot;
+  FootPedal pedal(DeviceModel::pedal_infinity, foot.opener());
+  SpaceMouseDevice hand(cap.opener(), HandGoal{}, Mat3{}, &pedal);
+  ASSERT_TRUE(foot.says({4, 0}, [&] { return pedal.pressed() == 4; }));
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 0) << "the right switch is not this hand's";
+  HandTuning t;
+  t.drill_switches = 4;
+  hand.tune(t);
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 255);
+  ASSERT_TRUE(foot.says({1, 0}, [&] { return pedal.pressed() == 1; }));
+  EXPECT_EQ(hand.read(0, 1e-3, {}).pedal, 0);
+}
+
+TEST(FootPedal, WhatIsDownWhenTheWindowIsLeftCountsOnceItHasComeUp) {
+  PluggedEnd foot;
+  FootPedal pedal(DeviceModel::pedal_infinity, foot.opener());
+  ASSERT_TRUE(foot.says({1, 0}, [&] { return pedal.pressed() == 1; }));
+  pedal.hold_back(true);
+  EXPECT_EQ(pedal.pressed(), 0U);
+  pedal.hold_back(false);
+  EXPECT_EQ(pedal.pressed(), 0U) << "it is still down";
+  // Another switch counts at once, and the first again from its next press on.
+  ASSERT_TRUE(foot.says({3, 0}, [&] { return pedal.pressed() == 2; }));
+  ASSERT_TRUE(foot.says({2, 0}, [&] { return pedal.pressed() == 2; }));
+  ASSERT_TRUE(foot.says({3, 0}, [&] { return pedal.pressed() == 3; }));
+  // A press between two looks is not missed; what is unplugged is not pressed.
+  ASSERT_TRUE(foot.says({0, 0}, [&] { return pedal.pressed() == 0; }));
+  EXPECT_EQ(pedal.pressed_since(), 3U);
+  EXPECT_EQ(pedal.pressed_since(), 0U);
+  ASSERT_TRUE(foot.says({1, 0}, [&] { return pedal.pressed() == 1; }));
+  ::close(foot.far);
+  for (int i = 0; i < 5000 && pedal.pressed() != 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(pedal.pressed(), 0U);
+}
+
 TEST(ClosedLoop, UnpluggedAndPluggedInAgain) {
   Loop l;
   l.loop.start();
@@ -437,7 +553,11 @@ TEST(ClosedLoop, TwoArmsAreTwoHands) {
     right.set_hand({6, 0, -6}, 0.3);
     EXPECT_TRUE(wait_for([&] { return left.force_n().z > 0.3 && right.force_n().z > 0.3; }));
     right.unplug();
-    EXPECT_TRUE(wait_for([&] { return !devices[1]->connected() && devices[0]->connected(); }));
+    // The link knows before the servo's next tick does; what is waited for is a record that says so.
+    EXPECT_TRUE(wait_for([&] {
+      return !devices[1]->connected() && devices[0]->connected() && !records.empty() && records.back().hand == 1 &&
+             records.back().device.age_ms == 255;
+    }));
     loop.request_stop();
     loop.join();
     take(reader);

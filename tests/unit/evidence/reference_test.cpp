@@ -117,6 +117,45 @@ TEST(Strokes, StillHandsAndCirclesHaveNone) {
   EXPECT_EQ(pauses.finish().size(), 3U);
 }
 
+// Minimum-jerk reaches of a second and 20 mm to and fro: their smoothness is known (evidence of the functions: statistics/movement_test).
+std::vector<Stroke> reaches(double rate_hz, double tremor_mm, double noise_mm) {
+  StrokeFinder finder;
+  std::mt19937 random(1);
+  std::normal_distribution<double> n(0, 1);
+  for (int t = 0; t < static_cast<int>(10 * rate_hz); ++t) {
+    const double s = t / rate_hz, u = s - std::floor(s), way = u * u * u * (10 - 15 * u + 6 * u * u);
+    const double x = 20 * (static_cast<int>(std::floor(s)) % 2 == 0 ? way : 1 - way);
+    const double shake = tremor_mm * std::sin(2 * std::numbers::pi * 9 * s);
+    finder.add(s, {x + shake + noise_mm * n(random), noise_mm * n(random), 50});
+  }
+  return finder.finish();
+}
+TEST(Strokes, SmoothnessIsThatOfTheirSpeed) {
+  for (const double rate : {100.0, 1000.0}) {
+    const auto smooth = reaches(rate, 0, 0);
+    ASSERT_GE(smooth.size(), 9U);
+    for (std::size_t s = 1; s + 1 < smooth.size(); ++s) {
+      // Exact: -1.4058 and -5.224 at 100 samples a second; cut at the turn to within a sample, filtered at 20 Hz.
+      EXPECT_NEAR(smooth[s].sparc, -1.4058, 0.015) << rate;
+      EXPECT_NEAR(smooth[s].log_dimensionless_jerk, -5.224, 0.15) << rate;
+    }
+  }
+  // Ten micrometres of noise leave SPARC where it is; a tremor does not.
+  const auto noisy = reaches(1000, 0, 0.01), shaking = reaches(1000, 0.2, 0);
+  ASSERT_GE(noisy.size(), 9U);
+  EXPECT_NEAR(noisy[3].sparc, -1.4058, 0.03);
+  ASSERT_GE(shaking.size(), 5U);
+  const auto longest =
+      std::max_element(shaking.begin(), shaking.end(), [](const Stroke& a, const Stroke& b) { return a.length_mm < b.length_mm; });
+  EXPECT_LT(longest->sparc, -1.6);
+  EXPECT_LT(longest->log_dimensionless_jerk, -7);
+  // Shorter than 100 ms: none.
+  StrokeFinder brief;
+  for (int t = 0; t < 10; ++t) brief.add(t / 100.0, {t * 0.3, 0, 0});
+  ASSERT_EQ(brief.finish().size(), 1U);
+  EXPECT_TRUE(std::isnan(brief.finish().front().sparc));
+}
+
 TEST(Strokes, VarianceIsThatOfTheirDirections) {
   const auto along = [](std::vector<Vec3> ways) {
     std::vector<Stroke> s;

@@ -6,6 +6,9 @@
 #include "osteo/bone/structure_map.h"
 #include "osteo/bone/world.h"
 #include "osteo/evidence/score.h"
+#include "osteo/evidence/visibility.h"
+#include "osteo/grid/brick_places.h"
+#include "soft_solid.h"
 
 namespace osteo::test {
 
@@ -18,18 +21,7 @@ inline World solid_world(const std::function<double(Vec3)>& inside, double h, do
   f.spacing_mm = {h, h, h};
   f.direction = rotation_about({}, normalized({1, 2, 3}), turn).rotation;
   f.origin_mm = f.direction * (Vec3{1, 1, 1} * ((1 - n) * h / 2)) + shift;  // faces at multiples of h
-  std::vector<Ijk> bricks;
-  for (int k = 0; k < n / 8; ++k)
-    for (int j = 0; j < n / 8; ++j)
-      for (int i = 0; i < n / 8; ++i) bricks.push_back({i, j, k});
-  BrickGrid g(f, bricks);
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const double d = inside(f.world_from_index({double(i), double(j), double(k)}));
-        g.set(g.find(i, j, k), static_cast<float>(std::clamp(d / h + 0.5, 0.0, 1.0)));
-      }
-  return World(std::move(g));
+  return World(soft_solid(f, inside));
 }
 
 // `value_of` says which structure a point lies in.
@@ -48,6 +40,28 @@ inline StructureMap structure_map(const std::function<std::uint8_t(Vec3)>& value
   l.voxels = v;
   l.structures = std::move(structures);
   return StructureMap(l);
+}
+
+// Bone before and after; what is gone.
+struct Drilled {
+  World before, after;
+  std::vector<RemovedVoxel> removed;
+};
+// `bone`, `kept`: as depths in mm; what is left is bone that is kept. Lattice as in solid_world().
+inline Drilled drilled(const std::function<double(Vec3)>& bone, const std::function<double(Vec3)>& kept, double h, double size_mm,
+                       Vec3 shift = {}, double turn = 0) {
+  Drilled c{solid_world(bone, h, size_mm, shift, turn),
+            solid_world([&](Vec3 p) { return std::min(bone(p), kept(p)); }, h, size_mm, shift, turn),
+            {}};
+  const BrickGrid &a = c.before.bodies().front().body->bone, &b = c.after.bodies().front().body->bone;
+  for (VoxelKey v = 0; v < a.brick_count() * BrickGrid::kVoxels; ++v) {
+    if (a.value(v) >= kSolid && b.value(v) < kSolid) c.removed.push_back({place_of_voxel_mm(a, v), static_cast<float>(h * h * h)});
+  }
+  return c;
+}
+// A shaft from above, its floor at `floor` and its radius `r` around (x, 0).
+inline std::function<double(Vec3)> shaft(double floor, double r, double x = 0) {
+  return [=](Vec3 p) { return std::max(floor - p.z, std::hypot(p.x - x, p.y) - r); };
 }
 
 }  // namespace osteo::test

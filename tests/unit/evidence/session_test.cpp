@@ -3,12 +3,14 @@
 
 #include <filesystem>
 
+#include "hole_script.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/bone/instrument.h"
 #include "osteo/evidence/score.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/scene/score_reader.h"
+#include "osteo/session/apply.h"
 #include "scene.h"
 #include "scratch.h"
 
@@ -26,20 +28,6 @@ const std::shared_ptr<const StructureMap>& rod() {
 }
 World block() {
   return test::solid_world(slab, 0.5, 24);
-}
-Script holes(int count) {
-  Script s;
-  s.axis = {0, 0.3, 0.95};
-  s.waypoints.push_back({0, {-6, 0, 8}, true});
-  for (int n = 0; n < count; ++n) {
-    const double x = -6 + 4.0 * n;
-    s.waypoints.push_back({n + 0.1, {x, 0, 8}, true});
-    s.waypoints.push_back({n + 0.2, {x, 0, 5.4}, true});
-    s.waypoints.push_back({n + 0.6, {x + 1, 0.5, 4.2}, true});
-    s.waypoints.push_back({n + 0.65, {x, 0, 8}, true});
-  }
-  s.waypoints.push_back({count + 0.0, {-6, 0, 8}, false});
-  return s;
 }
 SceneAction at(std::uint64_t tick, SceneAction a) {
   a.tick = tick;
@@ -85,7 +73,7 @@ RehearsalSummary record(const std::filesystem::path& file, int count, std::vecto
                         ScoreReader* live = nullptr) {
   RehearsalOptions o = options(file);
   o.actions = std::move(actions);
-  Rehearsal r(block(), std::make_unique<ScriptedDevice>(holes(count), 1000), o, {});
+  Rehearsal r(block(), std::make_unique<ScriptedDevice>(test::holes(count, -6, 4.2), 1000), o, {});
   if (camera) r.note("camera", kCamera);
   if (live != nullptr) r.add_reader(*live);
   RehearsalSummary s = r.run_to_end({});
@@ -115,6 +103,10 @@ TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
     EXPECT_EQ(a.value, b.value) << a.name();  // to the bit
     EXPECT_EQ(a.word, b.word);
   }
+  // One stepping: the scene that frames leave is that of a replay of the file's changes.
+  World applied = block();
+  apply_recorded(SessionReader(scratch / "s.oss"), applied);
+  EXPECT_EQ(tell_frames(SessionReader(scratch / "s.oss"), block(), [](const EvidenceFrame&) {}).hash(), applied.hash());
   EXPECT_NEAR(value(file.values, "removed_mm3"), s.removed_mm3, 1e-3);
   EXPECT_NEAR(value(file.values, "sawn_mm3"), s.sawn_mm3, 1e-3);
   EXPECT_GT(value(file.values, "seen_share"), 0.5);
@@ -133,6 +125,8 @@ TEST(Sessions, UndoTakesBackWhatWasRemoved) {
   EXPECT_EQ(value(back.values, "cavity_mm3"), 0);
   EXPECT_GT(value(back.values, "removed_mm3"), 0);  // work was done all the same
   EXPECT_TRUE(says(back, "nothing was removed"));
+  EXPECT_TRUE(says(back, "a step was taken back"));
+  EXPECT_FALSE(says(all, "taken back"));
   EXPECT_EQ(find(back.values, "seen_share")->word, "nothing was removed");
 }
 
@@ -152,6 +146,9 @@ TEST(Sessions, ItemsRulesAndSteps) {
   double phases = 0;
   for (int n = 1; n <= 5; ++n) phases += value(s.values, "phase_s[fifth " + std::to_string(n) + "]");
   EXPECT_LE(phases, value(s.values, "duration_s"));
+  // One step, about the rod: from the first drilling to the last.
+  EXPECT_GE(value(s.values, "step_s[all]"), value(s.values, "drilling_s"));
+  EXPECT_LT(value(s.values, "step_s[all]"), value(s.values, "duration_s"));
   const auto json = Json::parse(score_json(s, true).dump());
   ASSERT_TRUE(json);
   EXPECT_EQ(*json->find("osteotome_score")->number(), 1);
@@ -227,6 +224,49 @@ TEST(Sessions, HardCasesHaveAWordEach) {
   EXPECT_EQ(moments.front().what, "touched from the first tick on");
   EXPECT_EQ(value(values, "touches[rod]"), 1);
   EXPECT_EQ(value(values, "injured_s[rod]"), 0);  // it did not turn
+}
+
+TEST(Sessions, BonesInPiecesInRegionsAndGoneAltogether) {
+  const test::ScratchFolder scratch;
+  const Procedure p = parse_procedure(kProcedure, "t.json");
+  // Sawn in two and taken apart.
+  record(scratch / "two.oss", 2, {at(1200, SceneAction::saw({{3, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(1300, SceneAction::split(5))});
+  const Score two = score(scratch / "two.oss", &p);
+  EXPECT_TRUE(says(two, "bone in pieces"));
+  EXPECT_EQ(two.items[1].value, 2);
+  EXPECT_FALSE(two.items[1].pass);  // one was asked for
+  EXPECT_GT(value(two.values, "sawn_mm3"), 0);
+  const auto other_bone = [&](const std::string& name, World world, const Script& script) {
+    const World again = world.copy();
+    Rehearsal r(std::move(world), std::make_unique<ScriptedDevice>(script, 1000), options(scratch / name), {});
+    r.note("camera", kCamera);
+    const RehearsalSummary s = r.run_to_end({});
+    Score scored = score_session(SessionReader(scratch / name), again.copy(), rod().get(), &p, nullptr, {});
+    EXPECT_NEAR(value(scored.values, "removed_mm3"), s.removed_mm3, 1e-3);
+    return scored;
+  };
+  // A finer region under the first hole: by each voxel's own volume, what is gone is what was removed, but for voxels that are half gone.
+  Frame fine;
+  fine.dims = {24, 24, 24};
+  fine.spacing_mm = {0.25, 0.25, 0.25};
+  fine.origin_mm = Vec3{-9, -3, -2} + Vec3{0.125, 0.125, 0.125};
+  World with_region = block();
+  with_region.add_region(test::soft_solid(fine, slab));
+  const Score region = other_bone("region.oss", std::move(with_region), test::holes(1, -6, 4.2));
+  EXPECT_TRUE(says(region, "a finer region"));
+  EXPECT_FALSE(says(region, "bone in pieces"));
+  EXPECT_EQ(region.items[1].value, 1);  // a region is no piece
+  const double gone = value(region.values, "hidden_mm3") / (1 - value(region.values, "seen_share") + 1e-12);
+  if (value(region.values, "hidden_mm3") > 0) {
+    EXPECT_NEAR(gone, value(region.values, "removed_mm3"), 0.2 * gone);
+  }
+  // A crumb that is drilled away.
+  Script down;
+  down.waypoints = {{0, {-6, 0, 8}, true}, {0.2, {-6, 0, 6}, true}, {1.5, {-6, 0, 2}, true}, {1.7, {-6, 0, 8}, false}};
+  const Score none = other_bone("crumb.oss", test::solid_world([](Vec3 q) { return 0.8 - length(q - Vec3{-6, 0, 3.5}); }, 0.5, 24), down);
+  EXPECT_TRUE(says(none, "no bone is left"));
+  EXPECT_FALSE(says(none, "nothing was removed"));
+  EXPECT_TRUE(none.items[0].measured);
 }
 
 TEST(Sessions, AReferenceLeavesOutTheSamePerson) {

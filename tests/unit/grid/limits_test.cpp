@@ -47,6 +47,14 @@ static_assert(!too_wide_for_bricks({(1ULL << 17) - 1, 1, 1}) && too_wide_for_bri
 // Products that wrap around 64 bits.
 static_assert(too_wide_for_bricks({1ULL << 22, 1ULL << 22, 1ULL << 22}) && too_wide_for_bricks({1ULL << 32, 1ULL << 32, 1}));
 
+TEST(VdbFile, VoxelsTooSmallForItAreRefusedInWords) {
+  SparseGrid tiny = grid_of([](openvdb::FloatGrid& g) { g.tree().setValue({1, 1, 1}, 1.0F); });
+  for (std::size_t a = 0; a < 3; ++a) tiny.frame.spacing_mm[a] = 1e-7;
+  const auto path = fs::temp_directory_path() / ("osteo-tiny-" + std::to_string(::getpid()) + ".vdb");
+  expect_refused(ExitCode::failed, "1e-07 mm", [&] { save_grid(tiny, path); });
+  EXPECT_FALSE(fs::exists(path));
+}
+
 TEST(BrickLimits, BricksFarApartAreRefusedNotWrittenOutOfBounds) {
   for (const Ijk far : {Ijk{1 << 22, 1 << 22, 1 << 22}, Ijk{0, 1 << 27, 0}, Ijk{600, 600, 600}, Ijk{-1, 0, 0}})
     expect_refused(ExitCode::corrupt, far.i < 0 ? "negative" : "too far apart", [&] { BrickGrid({}, {{0, 0, 0}, far}); });

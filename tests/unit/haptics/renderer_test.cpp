@@ -55,6 +55,38 @@ TEST(Drag, RunsAlongTheSurfaceAndTurnsWithTheBurr) {
   EXPECT_LT(std::hypot(f.x, f.y), 0.05);
 }
 
+// A tool that slides over bone feels the scene's texture and one that rests does not; where none is listed nothing changes, to the bit; a
+// burr that turns has its own.
+TEST(Textured, IsFeltByWhatSlidesOverBone) {
+  const auto forces = [](const std::string& texture, double mm_a_tick, bool drill) {
+    auto bone = test::slab(0.5);
+    auto setup = quiet();
+    setup.texture_json = texture;
+    HapticRenderer r(setup, bone, {}, 1e-3);
+    settled(r, at({-3, 0, 1.4}, {0, 0, 1}, false), 200);
+    std::vector<std::array<float, 3>> all;
+    for (int t = 0; t < 200; ++t) all.push_back(r.step(at({-3 + mm_a_tick * t, 0, 1.4}, {0, 0, 1}, drill)).record.force_n);
+    return all;
+  };
+  const std::string texture =
+      R"({"osteotome_texture": 1, "rate_hz": 1000, "force_n": [0.5], "speed_mm_s": [20], "models": [{"force_n": 0.5, "speed_mm_s": 20, "ar": [0], "noise_n2": 0.04}]})";
+  const auto plain = forces("", 0.02, false), shaken = forces(texture, 0.02, false);
+  double power = 0;
+  for (std::size_t i = 100; i < 200; ++i) {
+    power += std::pow(shaken[i][1] - plain[i][1], 2) / 100;
+    EXPECT_NEAR(shaken[i][0], plain[i][0], 1e-4);  // the way it slides
+    EXPECT_NEAR(shaken[i][2], plain[i][2], 1e-4);  // out of the bone
+  }
+  EXPECT_NEAR(std::sqrt(power), 0.2, 0.05);
+  EXPECT_EQ(forces(texture, 0.02, false), shaken);
+  EXPECT_EQ(forces(texture, 0, false), forces("", 0, false));
+  EXPECT_EQ(forces(texture, 0.02, true), forces("", 0.02, true));
+  auto bone = test::slab(0.5);
+  auto setup = quiet();
+  setup.texture_json = "{}";
+  EXPECT_THROW(HapticRenderer(setup, bone, {}, 1e-3), Error);
+}
+
 TEST(Drag, AStandingBurrNeitherDragsNorCuts) {
   auto bone = test::slab(0.5);
   auto setup = quiet();

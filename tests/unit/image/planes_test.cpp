@@ -161,8 +161,8 @@ TEST(Thumbnail, HasSquareMillimetresAndTheHeadUp) {
   EXPECT_THROW(static_cast<void>(thumbnail(image, {2, 2}, 0, 0, 1)), Error);
 }
 
-Plane blobs(double dx, double dy, double angle) {
-  Plane p{120, 100, {}};
+PlaneImage blobs(double dx, double dy, double angle) {
+  PlaneImage p{120, 100, {}};
   const double cx = 59.5, cy = 49.5, c = std::cos(-angle), s = std::sin(-angle);
   for (int j = 0; j < p.height; ++j)
     for (int i = 0; i < p.width; ++i) {
@@ -183,8 +183,8 @@ TEST(PlaneMatch, PhaseFindsAShiftAndCorrelationATurn) {
   EXPECT_NEAR(fine.angle_rad, 0.14, 0.002);
   EXPECT_GT(fine.score, 0.99);
   // Nothing to go by.
-  EXPECT_EQ(match_by_correlation(blobs(0, 0, 0), Plane{120, 100, std::vector<float>(12000, 1.0F)}, {}).score, 0);
-  EXPECT_THROW(static_cast<void>(match_by_phase(blobs(0, 0, 0), Plane{8, 8, std::vector<float>(64)})), Error);
+  EXPECT_EQ(match_by_correlation(blobs(0, 0, 0), PlaneImage{120, 100, std::vector<float>(12000, 1.0F)}, {}).score, 0);
+  EXPECT_THROW(static_cast<void>(match_by_phase(blobs(0, 0, 0), PlaneImage{8, 8, std::vector<float>(64)})), Error);
 }
 
 }  // namespace

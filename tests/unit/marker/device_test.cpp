@@ -106,9 +106,9 @@ class PenHand : public ::testing::Test {
 
 TEST_F(PenHand, WaitsUntilThePenIsSeenThenFollowsItAndDrills) {
   const auto d = device();
-  const auto keys = d->keys().lock();
-  ASSERT_NE(keys, nullptr);
-  keys->press(true);
+  HandTuning keys;
+  keys.pedal = 255;
+  d->tune(keys);
   DeviceSample s = run(*d, 50);
   EXPECT_EQ(s.age_ms, 255);
   EXPECT_EQ(s.pedal, 0);  // no pen, no drill, whatever is pressed
@@ -128,11 +128,13 @@ TEST_F(PenHand, WaitsUntilThePenIsSeenThenFollowsItAndDrills) {
   s = run(*d, 3000);
   const Vec3 moved = from_floats(s.position_mm) - start_.position_mm;
   EXPECT_LT(length(moved - to_scene_ * Vec3{12, -5, 0}), 1.5);  // as true as pictures of this size are
-  keys->press(false);
+  keys.pedal = 0;
+  d->tune(keys);
   EXPECT_EQ(run(*d, 1).pedal, 0);
 
   // The clutch: the pen moves alone.
-  keys->clutch = true;
+  keys.clutch = true;
+  d->tune(keys);
   std::this_thread::sleep_for(std::chrono::milliseconds(350));
   give(seen(here));
   const DeviceSample held = run(*d, 2000);
@@ -141,8 +143,9 @@ TEST_F(PenHand, WaitsUntilThePenIsSeenThenFollowsItAndDrills) {
 
 TEST_F(PenHand, UnpluggedTheDrillStopsAndSeenAgainNothingJumps) {
   const auto d = device();
-  const auto keys = d->keys().lock();
-  keys->press(true);
+  HandTuning keys;
+  keys.pedal = 255;
+  d->tune(keys);
   give(seen(pen_pose(320, 20, 5, 5)));
   DeviceSample last = run(*d, 3000);
   ASSERT_EQ(last.pedal, 255);

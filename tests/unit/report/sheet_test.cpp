@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "layout.h"
+#include "plot.h"
 
 namespace osteo {
 namespace {
@@ -45,6 +47,30 @@ std::size_t count(const std::string& text, const std::string& what) {
 }
 std::size_t pages(const std::string& pdf) {
   return count(pdf, "/Type /Page") - count(pdf, "/Type /Pages");
+}
+
+TEST(Sheet, ADrawingIsTheSameLinesInBoth) {
+  sheet::Drawing d;
+  d.id = "d";
+  d.alt = "force \"over\" time";
+  d.width = 100;
+  d.height = 50;
+  d.line({{0, 0}, {10.123, 20}}, {255, 0, 0}, 2, true);
+  d.box(1, 2, 3, 4, {0, 0, 255}, 0.5);
+  d.text(50, 25, "a < b", 8, {0, 0, 0}, 0);
+  const std::string svg = svg_of(d);
+  EXPECT_NE(svg.find("aria-label=\"force &quot;over&quot; time\""), std::string::npos);
+  EXPECT_NE(svg.find("<path d=\"M0 0L10.12 20\" fill=\"none\" stroke=\"#ff0000\" stroke-width=\"2\""), std::string::npos);
+  EXPECT_NE(svg.find("<path d=\"M1 2L4 2L4 6L1 6Z\" fill=\"#0000ff\" opacity=\"0.5\"/>"), std::string::npos);
+  EXPECT_NE(svg.find("text-anchor=\"middle\">a &lt; b</text>"), std::string::npos);
+  Sheet s = example();
+  const std::string without = sheet_pdf(s);
+  s.blocks.push_back({d});
+  EXPECT_NE(sheet_html(s).find(svg), std::string::npos);
+  const std::string with = sheet_pdf(s);
+  EXPECT_GT(with.size(), without.size());
+  EXPECT_EQ(pages(with), pages(without));
+  EXPECT_EQ(sheet_pdf(s), with);
 }
 
 TEST(Sheet, WhatTheHtmlHoldsCanBeReadAgain) {
@@ -109,6 +135,60 @@ TEST(Sheet, PicturesShareTheWidth) {
   const sheet::Pictures row{{{"a", gradient(40, 20), ""}, {"b", gradient(20, 20), ""}}, 50};
   EXPECT_NEAR(report::row_height_mm(row, 61, 1), 20, 1e-9);   // 2 h + 1 h = 60
   EXPECT_NEAR(report::row_height_mm(row, 600, 1), 50, 1e-9);  // as high as wished
+}
+
+TEST(Plot, MarksLieWithinItAndValuesWhereTheyBelong) {
+  sheet::Plot p;
+  p.title = "t";
+  p.x = {0, 10, 5, "x", {}};
+  p.y = {0, 1, 0.5, "", {}};
+  p.lines.push_back({{{-10, 0.5}, {20, 0.5}}, Tone::bad, false});
+  p.lines.push_back({{{2, 2}, {8, 3}}, Tone::bad, false});
+  p.points.push_back({{{5, 0.5}, {5, 2}}, Tone::plain, true});
+  p.boxes.push_back({5, 2, 0.1, 0.25, 0.5, 0.75, 0.9});
+  const sheet::Drawing drawing = report::drawing_of(p, 200);
+  const double height = p.height_mm / report::kPtMm;
+  EXPECT_EQ(drawing.width, 200);
+  EXPECT_NEAR(drawing.height, height, 1e-9);
+  int dots = 0, red = 0, texts = 0;
+  std::array<double, 2> dot{};
+  double left = 0, right = 0;
+  const auto within = [&](double x, double y) {
+    EXPECT_GE(x, 0);
+    EXPECT_LE(x, 200);
+    EXPECT_GE(y, 0);
+    EXPECT_LE(y, height);
+  };
+  const auto bad = static_cast<std::uint8_t>(std::lround(255 * report::ink(Tone::bad).r));
+  for (const auto& mark : drawing.marks) {
+    if (const auto* const d = std::get_if<sheet::Drawing::Dot>(&mark)) {
+      ++dots;
+      dot = {d->x, d->y};
+      EXPECT_TRUE(d->hollow);
+      within(d->x, d->y);
+    } else if (const auto* const t = std::get_if<sheet::Drawing::Text>(&mark)) {
+      ++texts;
+      within(t->x, t->y);
+    } else {
+      const auto& path = std::get<sheet::Drawing::Path>(mark);
+      for (const auto& a : path.points) within(a[0], a[1]);
+      if (!path.stroke || (*path.stroke)[0] != bad) continue;
+      ++red;
+      left = path.points[0][0];
+      right = path.points[1][0];
+      EXPECT_NEAR(path.points[0][1], path.points[1][1], 1e-9);
+    }
+  }
+  EXPECT_EQ(dots, 1);  // the other lies outside
+  EXPECT_EQ(red, 1);   // cut at the axes; the second never meets them
+  EXPECT_NEAR(dot[0], (left + right) / 2, 1e-9);
+  EXPECT_GE(texts, 7);  // title, name, three ticks each way
+  Sheet s = example();
+  s.blocks.push_back({p});
+  const std::string html = sheet_html(s);
+  EXPECT_NE(html.find("class=\"plot\""), std::string::npos);
+  EXPECT_EQ(html, sheet_html(s));
+  EXPECT_EQ(sheet_pdf(s), sheet_pdf(s));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Two hands and live settings through a whole rehearsal: recorded, replayed to the bit.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -92,6 +93,30 @@ TEST(TwoHands, OneSucksWhileTheOtherDrillsAndAReplayGetsTheSame) {
     EXPECT_EQ(r.bone_hash, s.bone_hash);
     EXPECT_FALSE(r.dust_hash.empty());
   }
+}
+
+// A plate in the second hand is the second hand's when it is replayed too; in a file without the field, as before, the first's.
+TEST(TwoHands, WhoseHandAnActionMeansIsRecorded) {
+  const test::ScratchFolder scratch;
+  const Script script = drill_and_suck();
+  RehearsalOptions o = options(script, scratch / "grip.oss");
+  SceneAction grip = SceneAction::grip(0, {}, 1);
+  grip.tick = 400;
+  o.actions.push_back(grip);
+  Rehearsal r(bar(), devices_of(script, 1000), o, {});
+  const RehearsalSummary s = r.run_to_end({});
+  const Session session = read_session(scratch / "grip.oss");
+  const auto found =
+      std::find_if(session.actions.begin(), session.actions.end(), [](const RecordedAction& a) { return a.action.is(ActionKind::grip); });
+  ASSERT_NE(found, session.actions.end());
+  EXPECT_EQ(found->action.hand, 1u);
+  std::uint64_t held[2] = {};
+  for (const TickRecord& t : session.ticks) held[t.hand] += (t.flags & kPlateInHand) != 0 ? 1 : 0;
+  EXPECT_EQ(held[0], 0u);
+  EXPECT_GT(held[1], 1000u);
+  const ReplayResult again = replay(SessionReader(scratch / "grip.oss"), bar(), {}, {});
+  EXPECT_TRUE(again.identical) << again.difference;
+  EXPECT_EQ(again.bone_hash, s.bone_hash);
 }
 
 // The sucker alone makes the difference to the dust, and none to the bone that it does not touch.

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "bar.h"
+#include "evidence/scene.h"
+#include "osteo/scene/heat_score.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/session/session_reader.h"
 #include "scratch.h"
@@ -49,7 +51,7 @@ Drilled run(bool pedal, std::vector<SceneAction> actions, int tool) {
   const World world(test::bar(0.5, 0.2));
   RehearsalOptions o;
   o.session_file = scratch / "heat.oss";
-  o.follow = {true, true, false};
+  o.follow = {true, true, false, true};
   o.haptics.device = SpringHand::traits();
   o.actions = std::move(actions);
   Script script = hole(pedal);
@@ -58,6 +60,17 @@ Drilled run(bool pedal, std::vector<SceneAction> actions, int tool) {
   HeatReader live(world, nullptr, 1000), again(world, nullptr, 1000);
   r.add_reader(live);
   static_cast<void>(r.run_to_end({}));
+  r.look([&](const World&, SceneReaders& listed) {
+    Heated own = told(*listed.heat);
+    ++own.restarts;  // who joins is told of the scene once more
+    EXPECT_EQ(own, told(live)) << "the scene's own";
+    std::size_t warm = 0;
+    listed.heat->for_warm_places([&](Vec3 centre_mm, double radius_mm) {
+      ++warm;
+      EXPECT_LT(length(centre_mm - Vec3{-4, 0.2, 4}), 20 + radius_mm);
+    });
+    EXPECT_EQ(warm, listed.heat->warm_bricks());
+  });
   std::vector<Reader*> readers{&again};
   EXPECT_TRUE(replay(SessionReader(o.session_file), world.copy(), {}, {}, readers).identical);
   return {told(live), told(again)};
@@ -89,6 +102,38 @@ TEST(HeatReader, ABurrThatStandsHeatsNothing) {
   EXPECT_EQ(idle.live.added_j, 0);
   EXPECT_EQ(idle.live.bricks, 0u);
   EXPECT_EQ(idle.live.peak_c, 37);
+}
+
+TEST(HeatReader, IsAmongTheMetricsOfAScore) {
+  // Two balls: one under the hole, one at the bar's other end.
+  const StructureMap balls = test::structure_map(
+      [](Vec3 p) -> std::uint8_t {
+        return length(p - Vec3{-4, 0, 1}) < 1.5 ? 1 : length(p - Vec3{12, 0, 0}) < 1.5 ? 2 : 0;
+      },
+      {{1, "near", {}}, {2, "far", {}}}, 0.5, 32);
+  const test::ScratchFolder scratch;
+  const World world(test::bar(0.5, 0.2));
+  RehearsalOptions o;
+  o.session_file = scratch / "heat.oss";
+  o.haptics.device = SpringHand::traits();
+  Script script = hole(true);
+  script.tool = burr_index(BurrKind::diamond, 4);
+  Rehearsal r(world.copy(), std::make_unique<ScriptedDevice>(script, 1000), o, {});
+  HeatReader heat(world, &balls, 1000);
+  r.add_reader(heat);
+  static_cast<void>(r.run_to_end({}));
+  std::map<std::string, double> by_name;
+  for (const Measured& m : heat_values(heat, &balls)) by_name[m.name()] = m.value.value_or(-1);
+  ASSERT_EQ(by_name.size(), 5U);
+  EXPECT_EQ(by_name["heat_bone_c"], heat.hottest_c());
+  EXPECT_EQ(by_name["heat_peak_c[near]"], heat.structures().at(1).worst.peak_c);
+  EXPECT_GT(by_name["heat_peak_c[near]"], 37.5);
+  EXPECT_EQ(by_name["heat_cem43_min[near]"], heat.structures().at(1).worst.cem43_min);
+  EXPECT_NEAR(by_name["heat_peak_c[far]"], 37, 0.1);
+  EXPECT_EQ(by_name["heat_cem43_min[far]"], 0);
+  const auto bare = heat_values(heat, nullptr);
+  ASSERT_EQ(bare.size(), 3U);
+  EXPECT_EQ(bare[1].word, "the case has no structures");
 }
 
 // Bone that is cut, taken apart and put together again while it is warm.

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "bar.h"
+#include "hole_script.h"
 #include "osteo/scene/rehearsal.h"
 #include "osteo/session/session_reader.h"
 #include "rewrite_session.h"
@@ -16,20 +17,9 @@
 namespace osteo {
 namespace {
 
-// Holes in the bar's upper face (z = 4), one each second, drilled from 0.2 to 0.6 s of it.
+// Holes in the bar's upper face.
 Script holes(int count) {
-  Script s;
-  s.axis = {0, 0.3, 0.95};
-  s.waypoints.push_back({0, {-10, 0, 8}, true});
-  for (int n = 0; n < count; ++n) {
-    const double x = -10 + 4.0 * (n % 6);
-    s.waypoints.push_back({n + 0.1, {x, 0, 8}, true});
-    s.waypoints.push_back({n + 0.2, {x, 0, 5.4}, true});
-    s.waypoints.push_back({n + 0.6, {x + 1, 0.5, 4.6}, true});
-    s.waypoints.push_back({n + 0.65, {x, 0, 8}, true});
-  }
-  s.waypoints.push_back({count + 0.0, {-10, 0, 8}, false});
-  return s;
+  return test::holes(count, -10, 4.6);
 }
 
 SceneAction at(std::uint64_t tick, SceneAction a) {
@@ -209,6 +199,41 @@ TEST(Readers, ALateReaderIsRightFromThereOn) {
 }
 
 // Holes, a cut, a split and a move between them, and everything back, live and without a clock; the recording gives the same, both ways.
+// Whoever holds a lock takes what it can in its time; what is left comes later, in its order.
+TEST(Readers, ALittleAtATimeIsTheSame) {
+  World world(test::bar(0.5, 0.2));
+  HapticSetup setup;
+  setup.device = SpringHand::traits();
+  ScriptedDevice device(holes(1), 1000);
+  Stream stream;
+  StreamReader &first = stream.add_reader(), &second = stream.add_reader();
+  Operation operation(std::move(world), setup, {}, device, stream, 1000);
+  ReaderHub whole(first, operation.world()), parts(second, operation.world());
+  class Order final : public Reader {
+   public:
+    void action(const SceneAction& a) override { told.push_back({a.tick, true}); }
+    void tick(const TickRecord& r, std::span<const VoxelChange> c) override { told.push_back({r.tick, false}), changes += c.size(); }
+    std::vector<std::pair<std::uint64_t, bool>> told;
+    std::size_t changes = 0;
+  } at_once, by_and_by;
+  whole.add(at_once, false);
+  parts.add(by_and_by, false);
+  std::uint64_t t = 0;
+  for (; t < 700 && device.active(t); ++t) {
+    if (t % 50 == 10) ASSERT_TRUE(operation.act(SceneAction::suction({0, 0, double(t)}, 5, 200), [](const World::Effect&) {}).done);
+    operation.step(0);
+  }
+  const std::size_t taken = parts.drain(0);
+  EXPECT_GT(taken, 0u);
+  EXPECT_LT(taken, t / 2) << "some are left";
+  while (parts.drain(0) > 0) {
+  }
+  whole.drain();
+  EXPECT_EQ(by_and_by.told, at_once.told);
+  EXPECT_EQ(by_and_by.changes, at_once.changes);
+  EXPECT_EQ(at_once.told.size(), t + 14);
+}
+
 TEST(Strokes, AreTakenBackLiveAndInAReplay) {
   const World world(test::bar(0.5, 0.2));
   // Holes end at 0.65 s of each second, strokes 0.3 s later.

@@ -163,6 +163,28 @@ TEST(SoundTracker, HearsHandsActionsAndStructures) {
   EXPECT_EQ(t.state().metal_n, 3);
 }
 
+TEST(SoundTracker, HearsInstrumentsTouch) {
+  SoundTracker t({}, 1000, true);
+  TickRecord drill, sucker;
+  drill.device.tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, 4));
+  sucker.hand = 1;
+  sucker.device.tool = static_cast<std::uint8_t>(instrument_index("sucker 8 Fr"));
+  drill.device.axis = sucker.device.axis = {0, 0, 1};
+  const auto at = [&](float x_mm) {
+    sucker.device.position_mm = {x_mm, 0, 0};
+    for (int n = 0; n < 20; ++n) {
+      t.take(drill), t.take(sucker);
+      sucker.tick = ++drill.tick;
+    }
+    return t.state().metal_n;
+  };
+  EXPECT_EQ(at(8), 0);
+  EXPECT_GT(at(3), 0);  // 2 mm and 1.33 mm are more than 3
+  EXPECT_EQ(at(8), 0);
+  drill.flags = kPlateInHand;
+  EXPECT_EQ(at(3), 0);  // a plate is no shaft
+}
+
 TEST(SoundTracker, KnowsSoftStructuresByTheirNames) {
   const std::vector<Structure> names{{1, "facial nerve"}, {2, "Sigmoid sinus"}, {3, "dura"}, {4, "jugular bulb"}, {5, "malleus"}};
   EXPECT_EQ(soft_structures(names), (std::set<std::uint32_t>{2, 3, 4}));

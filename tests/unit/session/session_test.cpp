@@ -10,6 +10,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/bone/burr.h"
+#include "osteo/haptics/texture.h"
 #include "osteo/session/haptic_settings.h"
 #include "osteo/session/recorder.h"
 #include "osteo/session/script_file.h"
@@ -84,6 +85,29 @@ TEST(SessionFile, KeepsTheLawOfHardness) {
   EXPECT_EQ(read_session(path).header.haptics.hardness, true);
   EXPECT_EQ(read_session(path).header.haptics.hardness_json, default_hardness_json());
   fs::remove(path);
+}
+
+// A texture that a case names is kept as it is felt: what the header holds is read to the same model. Without one there is no key.
+TEST(SessionFile, KeepsTheTexture) {
+  const auto path = fresh("texture"), file = fresh("textured.json"), texture = fresh("texture.json");
+  write_file(
+      texture,
+      R"({"osteotome_texture": 1, "rate_hz": 1000, "force_n": [1], "speed_mm_s": [20], "models": [{"force_n": 1, "speed_mm_s": 20, "ar": [-1.2, 0.7], "noise_n2": 0.01}]})");
+  write_file(file, "{\"osteotome_haptics\": 1, \"texture_file\": \"" + texture.filename().string() + "\"}");
+  SessionHeader h = header();
+  { const SessionWriter w(path, h); }
+  EXPECT_EQ(read_session(path).header.haptics.texture_json, "");
+  fs::remove(path);
+  load_haptic_settings(file, h.haptics);
+  { const SessionWriter w(path, h); }
+  EXPECT_EQ(read_session(path).header.haptics.texture_json, h.haptics.texture_json);
+  EXPECT_NEAR(parse_texture(h.haptics.texture_json, "").nodes.at(0).reflection.at(1), 0.7, 1e-12);
+  fs::remove(texture);
+  write_file(texture, R"({"osteotome_texture": 1})");
+  EXPECT_THROW(load_haptic_settings(file, h.haptics), Error);
+  fs::remove(texture);
+  EXPECT_THROW(load_haptic_settings(file, h.haptics), Error);
+  for (const auto& p : {path, file}) fs::remove(p);
 }
 
 TEST(SessionFile, RoundTrip) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <set>
 
 #include "osteo/base/files.h"
@@ -206,10 +207,32 @@ TEST(Form, HoldsWhatARaterMayKnowAndNothingElse) {
   EXPECT_EQ(one.find("http:"), std::string::npos);
   EXPECT_EQ(one.find("https:"), std::string::npos);
   EXPECT_EQ(one.find("</script><b>"), std::string::npos);
+  EXPECT_FALSE(std::regex_search(one, std::regex("(19|20)[0-9]{2}[-./][0-9]{1,2}|[0-9]{1,2}[./-](19|20)[0-9]{2}"))) << "a date";
   EXPECT_LT(one.find("\"B"), one.size());
   EXPECT_THROW(static_cast<void>(form_html(s, "Dr. Miller")), Error);
   s.sessions.clear();
   EXPECT_THROW(static_cast<void>(form_html(s, "R1")), Error);
+}
+
+TEST(Form, OrderFollowsSeedAndRaterAndNotHowSessionsWereAdded) {
+  Study s = example();
+  std::vector<std::string> added;
+  for (const Session& x : s.sessions) added.push_back(x.blind);
+  const std::vector<std::string> order = rating_order(s, "R1");
+  EXPECT_EQ(order, rating_order(s, "R1"));
+  EXPECT_NE(order, rating_order(s, "R2"));
+  EXPECT_NE(order, added);
+  EXPECT_TRUE(std::is_permutation(order.begin(), order.end(), added.begin(), added.end()));
+  // The form lists them so, whatever else it holds.
+  const std::string form = form_html(s, "R1");
+  std::size_t last = form.find("\"sessions\"");
+  for (const std::string& blind : order) {
+    const std::size_t here = form.find("\"" + blind + "\"");
+    EXPECT_LT(last, here) << blind;
+    last = here;
+  }
+  ++s.plan.seed;
+  EXPECT_NE(order, rating_order(s, "R1"));
 }
 
 TEST(Ratings, WhatIsMissingIsTold) {
@@ -351,6 +374,33 @@ TEST(Analyse, ThreeGroupsAndSeveralItems) {
   EXPECT_EQ(a.json.find("comparisons")->items().size(), 15U);
   // The mean of items that are each other's opposite never varies.
   EXPECT_TRUE(refused(a, "Correlation of seconds", "never varies"));
+}
+
+TEST(Report, HasAChartForWhatItComparesAndSaysWhenItIsSimulated) {
+  const auto count = [](const std::string& html, const std::string& what) {
+    int n = 0;
+    for (std::size_t at = html.find(what); at != std::string::npos; at = html.find(what, at + 1)) ++n;
+    return n;
+  };
+  Study s = example();
+  AnalysisSettings quick;
+  quick.resamples = 100;
+  const std::string html = sheet_html(analyse(s, quick).sheet);
+  EXPECT_EQ(count(html, "id=\"groups-"), 3);  // a rating, two metrics
+  EXPECT_EQ(count(html, "id=\"scatter-"), 2);
+  EXPECT_EQ(count(html, "id=\"roc-"), 3);
+  EXPECT_EQ(count(html, "id=\"agreement-"), 3);  // three pairs of raters
+  EXPECT_EQ(count(html, "SIMULATED"), 0);
+  // Whole numbers are written out.
+  Study slow = s;
+  for (Session& one : slow.sessions) one.metrics["seconds"] *= 10;
+  EXPECT_EQ(count(sheet_html(analyse(slow, quick).sheet), "e+0"), 0);
+  s.plan.simulated = true;
+  const Analysis simulated = analyse(s, quick);
+  EXPECT_GE(count(sheet_html(simulated.sheet), "SIMULATED"), 1);
+  EXPECT_TRUE(*simulated.json.find("simulated")->flag());
+  // One group: no charts of what is not compared, and no crash.
+  EXPECT_EQ(count(sheet_html(analyse(example(3, 0, plan_of({"novice"})), quick).sheet), "id=\"roc-"), 0);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "meshes.h"
 #include "osteo/base/error.h"
+#include "osteo/data/tet_check.h"
 #include "osteo/distance/compare.h"
 #include "osteo/io/tet_io.h"
 #include "osteo/tets/graded_tets.h"
@@ -258,6 +259,80 @@ TEST(Skin, RestAndAffineMotionAreExact) {
   const Skin skin(skin_mesh, rest);
   std::vector<std::array<float, 3>> few(3), out(skin.point_count());
   EXPECT_THROW(skin.apply(few, out), Error);
+}
+
+TEST(Stuffing, KeepsThinWallsAndOpensHinges) {
+  // A box of 40 mm with walls of 1 mm, at a spacing of 2: most of it was lost.
+  const TriangleSoup thin = joined(box({0, 0, 0}, {40, 40, 40}), turned(box({1, 1, 1}, {39, 39, 39})));
+  const double volume = 64000 - 38.0 * 38 * 38;
+  const double lost = volume_mm3(stuffed_tets(thin, {2, 15}));
+  EXPECT_LT(lost, 0.8 * volume);
+  const KeptThin kept = stuffed_tets_keeping(thin, {2, 15}, volume, 0.05, 3);
+  EXPECT_LT(kept.spacing_mm, 2);
+  EXPECT_NEAR(volume_mm3(kept.mesh), volume, 0.05 * volume);
+  const TetQuality q = tet_quality(kept.mesh);
+  EXPECT_EQ(q.inverted, 0U);
+  EXPECT_TRUE(q.boundary_closed && q.boundary_manifold);
+  // What is thick enough stays as it is.
+  EXPECT_EQ(stuffed_tets_keeping(sphere(10, 3), {2, 15}, volume_mm3(stuffed_tets(sphere(10, 4), {1, 15})), 0.05, 3).spacing_mm, 2);
+}
+
+TEST(Stuffing, HingesComeApart) {
+  // Two tetrahedra that share a point, two that share an edge, two that share a face.
+  TetMesh m;
+  m.points_mm = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  m.tets = {{0, 1, 2, 3}, {0, 4, 6, 5}};
+  EXPECT_EQ(open_hinges(m), 1U);
+  EXPECT_EQ(m.points_mm.size(), 8U);
+  EXPECT_TRUE(check(boundary_of(m)).manifold());
+  EXPECT_EQ(open_hinges(m), 0U);
+  m.points_mm.resize(7);
+  m.tets = {{0, 1, 2, 3}, {0, 3, 4, 5}};
+  EXPECT_EQ(open_hinges(m), 2U);
+  EXPECT_TRUE(check(boundary_of(m)).manifold());
+  m.points_mm.resize(7);
+  m.tets = {{0, 1, 2, 3}, {0, 2, 4, 3}};
+  EXPECT_EQ(open_hinges(m), 0U);
+}
+
+TEST(TetMeshes, AreRefusedWhereTheyAreNone) {
+  TetMesh m;
+  m.points_mm = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  m.tets = {{0, 1, 2, 3}};
+  EXPECT_NO_THROW(require_sound(m));
+  const auto path = std::filesystem::temp_directory_path() / ("osteo-unsound-" + std::to_string(::getpid()) + ".vtu");
+  const auto refused = [&](const std::string& what) {
+    try {
+      save_tets(m, path);
+      ADD_FAILURE() << what;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::failed);
+      EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
+    }
+    EXPECT_FALSE(std::filesystem::exists(path));
+  };
+  m.points_mm[3][1] = std::numeric_limits<float>::infinity();
+  refused("no finite number");
+  m.points_mm[3] = {0, 0, -1};
+  refused("1 of 1 tetrahedra are inside out");
+  m.points_mm[3] = {0, 0, 0};
+  refused("inside out or have no volume");
+  for (auto& p : m.points_mm) p = {1e8F, 1e8F, 1e8F};
+  refused("kept to 8 mm");
+}
+
+TEST(TetMeshes, OfQuadraticElementsAreTheirCorners) {
+  const auto path = std::filesystem::temp_directory_path() / ("osteo-quadratic-" + std::to_string(::getpid()) + ".vtu");
+  std::ofstream(path) << R"(<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid><Piece NumberOfPoints="10" NumberOfCells="1">
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 .5 0 0 1 0 0 .5 .5 0 0 1 0 0 .5 0 0 0 .5 .5 0 .5 0 .5 .5 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 2 4 9 1 3 5 6 7 8</DataArray><DataArray type="Int64" Name="offsets" format="ascii">10</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">24</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>)";
+  const Tets back = load_tets(path);
+  std::filesystem::remove(path);
+  ASSERT_EQ(back->points_mm.size(), 4U);
+  EXPECT_EQ(back->tets[0], (std::array<std::uint32_t, 4>{0, 1, 2, 3}));
+  EXPECT_EQ(back->points_mm[3], (std::array<float, 3>{0, 0, 1}));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <vtkRenderer.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -67,6 +68,30 @@ TEST(DustView, IsSeenWhereItLies) {
   EXPECT_EQ(lit(stage.window.render()), 0);
 }
 
+// How alike a part of a picture is to itself moved by so many pixels, brightness about its mean: 1 is the same.
+double likeness(const Picture& p, int width, std::array<int, 4> part, int dx, int dy) {
+  const auto [x0, x1, y0, y1] = part;
+  const auto at = [&](int x, int y) {
+    return static_cast<double>(p.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))]);
+  };
+  double mean = 0;
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) mean += at(x, y);
+  mean /= (x1 - x0) * (y1 - y0);
+  double sum = 0, square = 0;
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) {
+      sum += (at(x, y) - mean) * (at(x + dx, y + dy) - mean);
+      square += (at(x, y) - mean) * (at(x, y) - mean);
+    }
+  return square > 0 ? sum / square : 0;
+}
+
+// 300 pixels show 2 * tan(15 deg) * radius / 0.24 mm.
+double pixels_a_cell(double radius_mm) {
+  return 0.5 * 300 / (2 * std::tan(15 * 3.14159265358979 / 180) * radius_mm / 0.24);
+}
+
 // A flat layer of dust seen from above, along the rows of its cells: brightness moved by a cell's width resembles itself no more than when
 // moved by any other width.
 TEST(DustView, ShowsNoRows) {
@@ -81,33 +106,63 @@ TEST(DustView, ShowsNoRows) {
   view.update(dust);
   const Picture p = stage.window.render();
   keep(p, "dust-layer.png");
-  const int size = 300, from = 70, to = 230;
-  const auto at = [&](int x, int y) {
-    return static_cast<double>(p.rgb[3 * (static_cast<std::size_t>(y) * size + static_cast<std::size_t>(x))]);
-  };
-  double mean = 0, count = 0;
-  for (int y = from; y < to; ++y)
-    for (int x = from; x < to; ++x) mean += at(x, y), ++count;
-  mean /= count;
-  const auto likeness = [&](int dx, int dy) {
-    double sum = 0, square = 0;
-    for (int y = from; y < to; ++y)
-      for (int x = from; x < to; ++x) {
-        sum += (at(x, y) - mean) * (at(x + dx, y + dy) - mean);
-        square += (at(x, y) - mean) * (at(x, y) - mean);
-      }
-    return square > 0 ? sum / square : 0;
-  };
   ASSERT_GT(lit(p), 4000);
-  // 300 pixels show 2 * tan(15 deg) * 6 / 0.24 mm.
-  const double pixels_a_cell = 0.5 * 300 / (2 * std::tan(15 * 3.14159265358979 / 180) * 6 / 0.24);
   double worst = 0;
   for (const int cells : {1, 2, 3}) {
-    const int by = static_cast<int>(std::lround(cells * pixels_a_cell));
-    for (int off = -2; off <= 2; ++off) worst = std::max({worst, likeness(by + off, 0), likeness(0, by + off)});
+    const int by = static_cast<int>(std::lround(cells * pixels_a_cell(6)));
+    for (int off = -2; off <= 2; ++off)
+      worst = std::max({worst, likeness(p, 300, {70, 230, 70, 230}, by + off, 0), likeness(p, 300, {70, 230, 70, 230}, 0, by + off)});
   }
-  std::printf("likeness at the cells' distance (%.1f pixels): %.3f\n", pixels_a_cell, worst);
+  std::printf("likeness at the cells' distance (%.1f pixels): %.3f\n", pixels_a_cell(6), worst);
   EXPECT_LT(worst, 0.25);
+}
+
+// Slurry that runs over an edge and falls, seen from the side: drops, not rods along gravity. Of how pixels within the stream differ,
+// hardly anything is what columns of pixels have in common.
+TEST(DustView, WhatFallsShowsNoRows) {
+  const auto bone = test::solid(0.5, 12, [](Vec3 p) { return p.x < 0 && p.y > -10 && p.y < -6; });
+  Dust dust(bone, {.gravity = {0, 1, 0}});
+  for (int s = 0; s < 160; ++s) {
+    for (double z = -3; z <= 3; z += 0.5) {
+      dust.irrigate({-0.5, -11, z}, {0, 1, 0}, 6, 0.2);
+      dust.add_at({-0.5, -10.5, z}, 0.01);
+    }
+    dust.step();
+  }
+  Stage stage({0, 0, -1}, 6, {2, 3, 0});
+  DustView view(stage.renderer, 0.5);
+  view.update(dust);
+  const Picture p = stage.window.render();
+  keep(p, "dust-falling.png");
+  const auto at = [&](int x, int y) {
+    return static_cast<double>(p.rgb[3 * (static_cast<std::size_t>(y) * 300 + static_cast<std::size_t>(x))]);
+  };
+  std::array<double, 300> column{};
+  for (int x = 0; x < 300; ++x)
+    for (int y = 60; y < 240; ++y) column[static_cast<std::size_t>(x)] += at(x, y) / 180;
+  const double brightest = *std::max_element(column.begin(), column.end());
+  const auto in_stream = [&](int x) { return column[static_cast<std::size_t>(x)] > 0.6 * brightest; };
+  double mean = 0, wide = 0, columns = 0, pixels = 0;
+  for (int x = 0; x < 300; ++x)
+    if (in_stream(x)) mean += column[static_cast<std::size_t>(x)], ++wide;
+  mean /= wide;
+  std::array<double, 4> alike{};
+  for (int x = 0; x < 300; ++x) {
+    if (!in_stream(x)) continue;
+    const double c = column[static_cast<std::size_t>(x)];
+    columns += 180 * (c - mean) * (c - mean);
+    for (int y = 60; y < 240; ++y) {
+      pixels += (at(x, y) - c) * (at(x, y) - c);
+      for (int cells = 1; cells < 4; ++cells)
+        alike[static_cast<std::size_t>(cells)] += (at(x, y) - c) * (at(x, y + static_cast<int>(std::lround(cells * pixels_a_cell(6)))) - c);
+    }
+  }
+  const double worst = *std::max_element(alike.begin(), alike.end()) / pixels;
+  std::printf("the stream is %.0f pixels wide; columns make %.3f of its differences; moved by cells: %.3f\n", wide,
+              columns / (columns + pixels), worst);
+  EXPECT_GT(wide, 2 * pixels_a_cell(6));
+  EXPECT_LT(columns / (columns + pixels), 0.2);
+  EXPECT_LT(worst, 0.1);
 }
 
 // A pool is seen as a surface, darker than bone where it is clear, pale where it is thick; a dry bowl shows none of it.

@@ -80,5 +80,39 @@ TEST(Openness, RenewedIsAsMadeAnew) {
   EXPECT_LT(at(live, bone, {0.3, -0.2, -1.1}, {0, 0, 1}), 0.8);
 }
 
+// A finer region and what is around it are two bodies of one bone: together they let in what one body would.
+TEST(Openness, TwoBodiesShadeEachOther) {
+  constexpr double kVoxel = 0.4, kRegion = 3.2;
+  const auto is_bone = [](Vec3 p) { return p.z < 2 && !(p.z > -2 && std::hypot(p.x, p.y) < 3); };
+  const auto in_region = [](Vec3 p) { return std::abs(p.x) < kRegion && std::abs(p.y) < kRegion && std::abs(p.z + 2) < kRegion; };
+  const auto whole = test::solid(kVoxel, 10, is_bone, {}, 2);
+  const auto around = test::solid(
+      kVoxel, 10, [&](Vec3 p) { return is_bone(p) && !in_region(p); }, {}, 2);
+  const auto fine = test::solid(
+      0.2, kRegion,
+      [&](Vec3 p) {
+        return is_bone(p + Vec3{0, 0, -2});
+      },
+      {0, 0, -2}, 2);
+  const Openness all(whole);
+  const auto far = std::make_shared<const Openness>(around), near = std::make_shared<const Openness>(fine);
+  const std::vector<std::shared_ptr<const Openness>> of_far{far}, of_near{near};
+  double worst = 0, alone = 0;
+  for (double a = 0; a < 6; a += 0.4) {
+    for (const double r : {0.0, 1.0, 2.0}) {  // the floor, in the region
+      const Vec3 p{r * std::cos(a), r * std::sin(a), -2}, n{0, 0, 1};
+      const double exact = at(all, whole, p, n);
+      worst = std::max(worst, std::abs(near->at(to_floats(fine.frame().index_from_world(p)), to_floats(n), of_far) - exact));
+      alone = std::max(alone, std::abs(at(*near, fine, p, n) - exact));
+    }
+    // The wall above it, outside of the region.
+    const Vec3 n{-std::cos(a), -std::sin(a), 0}, p = n * -3 + Vec3{0, 0, 1.6};
+    worst = std::max(worst, std::abs(far->at(to_floats(around.frame().index_from_world(p)), to_floats(n), of_near) - at(all, whole, p, n)));
+  }
+  std::printf("off one body's: each with the other %.3f, alone %.3f\n", worst, alone);
+  EXPECT_LT(worst, 0.12);
+  EXPECT_GT(alone, 0.25);
+}
+
 }  // namespace
 }  // namespace osteo

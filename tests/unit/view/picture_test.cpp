@@ -20,6 +20,7 @@
 #include "osteo/view/bone_view.h"
 #include "osteo/view/changes.h"
 #include "osteo/view/offscreen.h"
+#include "osteo/view/wet_film.h"
 #include "solid.h"
 
 namespace osteo {
@@ -105,8 +106,18 @@ TEST(Picture, NothingBurnsOutAndNoShadowIsBlack) {
   Scene scene;
   BoneView view(scene.renderer);
   view.show(surface);
-  for (const double wet : {0.0, 1.0}) {
-    view.set_wetness(wet);
+  Dust dust(bone);
+  WetFilm film;
+  view.set_film(&film);
+  for (const bool wet : {false, true}) {
+    // From all around, a film everywhere.
+    for (int n = 0; wet && n < 3000; ++n) {
+      const double z = (n % 60) / 30.0 - 1, a = n * 2.4, r = std::sqrt(1 - z * z);
+      const Vec3 from = Vec3{r * std::cos(a), r * std::sin(a), z} * 14.0;
+      dust.irrigate(from, normalized(from) * -1, 20, 0.05);
+    }
+    film.update(dust);
+    view.wet(surface);
     for (const Vec3 eye : {Vec3{0, -1, 0}, {1, 0, 0}, {0.6, -0.7, 0.4}, {-0.5, 0.5, -0.7}}) {
       look_at(scene.renderer, {0, 0, 0}, 13, normalized(eye));
       for (const bool effects : {false, true}) {
@@ -256,7 +267,7 @@ TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
     scene.renderer->ResetCameraClippingRange();
     view.place({});
     view.highlight(false);
-    view.set_wetness(0);
+    view.wet(surface);
     EXPECT_EQ(stamp(), last);
   }
   const auto changed = [&](const char* what) {
@@ -271,7 +282,12 @@ TEST(Picture, IsDrawnAgainOnlyWhenSomethingHasChanged) {
   changed("and again");
   view.highlight(true);
   changed("highlight");
-  view.set_wetness(0.5);
+  Dust dust(bone);
+  WetFilm film;
+  view.set_film(&film);
+  dust.irrigate({0, -14, 0}, {0, 1, 0}, 20, 2);
+  ASSERT_TRUE(film.update(dust));
+  view.wet(surface);
   changed("wetness");
   view.update(surface, std::vector<std::uint32_t>{surface.bone().find_brick(1, 1, 1)});
   changed("bone");

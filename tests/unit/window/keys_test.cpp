@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 
 namespace osteo {
 namespace {
@@ -15,13 +16,20 @@ namespace {
 using Event = Keyboard::Event;
 
 TEST(Keys, EachKeyHasOneMeaning) {
-  std::set<int> codes;
+  std::set<std::pair<int, int>> codes;
   for (const Key& k : key_table()) {
-    EXPECT_TRUE(codes.insert(k.code).second) << k.code;
-    EXPECT_EQ(find_key(k.code)->command, k.command);
+    EXPECT_TRUE(codes.insert({k.code, k.with}).second) << k.code;
+    EXPECT_EQ(find_key(k.code, k.with)->command, k.command);
   }
+  // With Ctrl another than alone; with Ctrl where it means nothing, as alone.
+  EXPECT_EQ(find_key('L', kWithCtrl)->command, Command::regions);
+  EXPECT_EQ(find_key('L', kWithShift)->command, Command::plates);
+  EXPECT_EQ(find_key('J', kWithCtrl)->command, Command::quality);
+  EXPECT_EQ(find_key('T', kWithCtrl)->command, Command::timeline);
   EXPECT_EQ(find_key('J')->command, Command::quality);
-  EXPECT_EQ(find_key('-'), nullptr);
+  EXPECT_EQ(find_key('J', kWithAlt | kWithShift)->command, Command::quality) << "Alt means nothing to it";
+  EXPECT_EQ(find_key('8'), nullptr);
+  EXPECT_EQ(find_key(263)->command, Command::earlier) << "Left, without Alt";
 }
 
 TEST(Keys, HelpTellsOfEachCommandOnceAndOfNoOther) {
@@ -39,7 +47,8 @@ TEST(Keys, HelpNamesTheKeysThemselves) {
     for (const Key& k : key_table()) {
       const bool letter = k.code >= 'A' && k.code <= 'Z';
       const bool told = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
-      if (letter) EXPECT_EQ(keys.find(std::string(" ") + static_cast<char>(k.code) + ",") != std::string::npos, told) << line.keys;
+      const std::string name = std::string(k.with == kWithCtrl ? "Ctrl-" : k.with == kWithAlt ? "Alt-" : "") + static_cast<char>(k.code);
+      if (letter) EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, told) << line.keys;
     }
   }
 }
@@ -57,10 +66,13 @@ TEST(Keys, TheGuideTellsOfEachKey) {
   std::erase(keys, '*');
   for (const Key& k : key_table()) {
     if (k.code < 'A' || k.code > 'Z') continue;
-    EXPECT_NE(keys.find(std::string(" ") + static_cast<char>(k.code) + ","), std::string::npos) << static_cast<char>(k.code);
+    const std::string name = std::string(k.with == kWithCtrl ? "Ctrl-" : k.with == kWithAlt ? "Alt-" : "") + static_cast<char>(k.code);
+    EXPECT_NE(keys.find(" " + name + ","), std::string::npos) << name;
   }
   for (const char* name :
-       {" F5,", " Enter,", " Esc,", " Home,", " Space,", " Up,", " Down,", " F1,", " 1 to 7,", " F2,", " F9,", " F10,", " F11,", " Tab,"})
+       {" F5,", " Enter,", " Esc,", " Home,", " Space,",      " Up,",      " Down,",   " F1,",         " 1 to 7,",    " F2,",
+        " F9,", " F10,",   " F11,", " Tab,",  " Alt-arrows,", " Page Up,", " Insert,", " apostrophe,", " backslash,", " grave accent,",
+        " -,",  " =,",     " 9,",   " 0,",    " Alt-H,",      " Ctrl-H,",  " Ctrl-T,", " Left,",       " Right,"})
     EXPECT_NE(keys.find(name), std::string::npos) << name << " in" << keys;
 }
 
@@ -82,7 +94,7 @@ TEST(Keyboard, AShortPressIsNotMissed) {
 
 TEST(Keyboard, ShiftBelongsToItsPress) {
   Keyboard k;
-  k.on('G', Event::pressed, true);
+  k.on('G', Event::pressed, kWithShift);
   k.on('G', Event::released);
   k.on('G', Event::pressed);
   const auto presses = k.frame(false);

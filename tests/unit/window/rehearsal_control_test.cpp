@@ -319,5 +319,179 @@ TEST(RehearsalControl, WhatFailsIsToldAndCanBePutRight) {
   EXPECT_NE(std::string(control.failure()->what()).find("ended by itself"), std::string::npos);
 }
 
+// A tilt turns the handle about the burr's centre: the burr stays where it is. It stays tilted, and what was recorded says so.
+TEST(RehearsalControl, ATiltLeavesTheBurrWhereItIs) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  const auto tick = [&] { return control.rehearsal().latest(); };
+  const auto axis = [&] { return from_floats(tick().device.axis); };
+  ASSERT_TRUE(frames_until(control, [&] { return tick().tick > 300 && length(axis() - control.handle().axis(kFromAbove)) < 2e-3; }));
+  const Vec3 at = from_floats(tick().device.position_mm), before = axis();
+  for (int n = 0; n < 5; ++n) press(control, Command::tilt, 1);  // 15 degrees to the right
+  press(control, Command::roll, 1);
+  const Vec3 wanted = control.handle().axis(kFromAbove);
+  EXPECT_GT(length(wanted - before), 0.1);
+  ASSERT_TRUE(frames_until(control, [&] { return length(axis() - wanted) < 2e-3; }));
+  EXPECT_LT(length(from_floats(tick().device.position_mm) - at), 1e-3);
+  const std::uint64_t then = tick().tick;
+  ASSERT_TRUE(frames_until(control, [&] { return tick().tick > then + 200; }));
+  EXPECT_LT(length(axis() - wanted), 2e-3);
+  EXPECT_LT(length(from_floats(tick().device.position_mm) - at), 1e-3);
+  press(control, Command::straight);
+  ASSERT_TRUE(frames_until(control, [&] { return length(axis() - before) < 2e-3; }));
+  sitting.running->stop();
+}
+
+TEST(RehearsalControl, MotionsAreScaledAndTheClutchHoldsTheDrill) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  HandInput input;
+  const auto frame = [&] { control.hold(input); };
+  frame();
+  const Vec3 start = control.goal_mm();
+  const MouseStep step{start + Vec3{8, 4, 0}, {8, 4, 0}};
+  press(control, Command::motion, -1);
+  press(control, Command::motion, -1);
+  EXPECT_EQ(control.message(), "motion of the hand 1:4");
+  control.drag_hand(step);
+  EXPECT_LT(length(control.goal_mm() - (start + Vec3{2, 1, 0})), 1e-12);
+  control.push_hand(2);
+  EXPECT_LT(length(control.goal_mm() - (start + Vec3{2, 1, -0.5})), 1e-12) << "into the depth too";
+  input.wrist_rest = true;
+  frame();
+  control.drag_hand(step);
+  EXPECT_LT(length(control.goal_mm() - (start + Vec3{2.4, 1.2, -0.5})), 1e-12);
+  input.wrist_rest = false;
+  input.clutch = true;
+  frame();
+  const Vec3 held = control.goal_mm(), axis = control.handle().axis(kFromAbove);
+  control.drag_hand(step);
+  control.push_hand(5);
+  press(control, Command::deeper);
+  press(control, Command::tilt, 1);
+  PadMotion pad;
+  pad.right_mm_s = 40;
+  input.pad = pad;
+  input.seconds = 0.1;
+  frame();
+  EXPECT_EQ(control.goal_mm(), held);
+  EXPECT_EQ(control.handle().axis(kFromAbove), axis);
+  sitting.running->stop();
+}
+
+// How far a pedal is down, times what the person lets the burr have, is in the stream.
+TEST(RehearsalControl, APedalDrillsAsFarAsItIsDown) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  HandInput input;
+  const auto pedal = [&] { return control.rehearsal().latest().device.pedal; };
+  input.drill = 0.5;
+  EXPECT_TRUE(frames_until(
+      control, [&] { return pedal() == 128; }, input));
+  for (const int wanted : {191, 128, 64, 64}) {
+    press(control, Command::burr_speed, -1);
+    input.drill = 1;
+    EXPECT_TRUE(frames_until(
+        control, [&] { return pedal() == wanted; }, input))
+        << wanted;
+  }
+  // Held on the way it does not drill where it arrives.
+  press(control, Command::lift);
+  EXPECT_TRUE(frames_until(
+      control, [&] { return !control.leading(); }, input));
+  EXPECT_TRUE(frames_until(
+      control, [&] { return pedal() == 0; }, input));
+  for (int n = 0; n < 10; ++n) control.hold(input);
+  EXPECT_EQ(pedal(), 0);
+  EXPECT_TRUE(frames_until(control, [&] { return pedal() == 0; }));
+  EXPECT_TRUE(frames_until(
+      control, [&] { return pedal() == 64; }, input));
+  sitting.running->stop();
+}
+
+TEST(RehearsalControl, TheBurrIsChangedStepByStep) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  const auto burr = [&] { return burr_library()[static_cast<std::size_t>(control.tool())].name(); };
+  press(control, Command::other_burr);
+  EXPECT_EQ(burr(), "diamond 4 mm");
+  press(control, Command::next_burr, 1);
+  EXPECT_EQ(burr(), "diamond 5 mm");
+  for (int n = 0; n < 5; ++n) press(control, Command::next_burr, -1);
+  EXPECT_EQ(burr(), "diamond 7 mm") << "behind the smallest comes the largest";
+  press(control, Command::other_burr);
+  EXPECT_EQ(burr(), "cutting 7 mm");
+  sitting.running->stop();
+}
+
+// The mouse takes the second hand along; it stays there, works there, and with nothing in it goes back to the burr.
+TEST(RehearsalControl, TheMouseMovesTheSecondHand) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  const auto second = [&] { return from_floats(control.rehearsal().latest(1).device.position_mm); };
+  control.wash(false, false);
+  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().tick > 50; }));
+  const Vec3 drill = control.goal_mm();
+  control.drag_second({0, 3, 0});
+  EXPECT_NE(control.message().find("sucker"), std::string::npos) << control.message();
+  const Vec3 there = control.second_mm() + Vec3{2, 0, 1};
+  control.drag_second({2, 0, 1});
+  EXPECT_EQ(control.second_mm(), there);
+  HandInput input;
+  input.second_hand = input.pressed = input.on_bone = true;
+  const auto so = [&] {
+    control.wash(false, false);
+    return length(second() - there) < 0.05 && control.rehearsal().latest(1).device.pedal == 255;
+  };
+  EXPECT_TRUE(frames_until(control, so, input));
+  EXPECT_TRUE(control.sucking());
+  EXPECT_EQ(control.rehearsal().latest().device.pedal, 0) << "the button is the second hand's";
+  EXPECT_EQ(control.goal_mm(), drill);
+  // The drill goes away, the sucker stays.
+  control.move_hand(drill + Vec3{10, 0, 0});
+  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.position_mm[0] > drill.x + 9; }));
+  control.wash(false, false);
+  EXPECT_EQ(control.second_mm(), there);
+  for (int n = 0; n < 3; ++n) press(control, Command::second_hand);
+  EXPECT_EQ(control.message(), "second hand: nothing");
+  control.wash(false, false);
+  EXPECT_TRUE(control.second_hand_empty());
+  const auto back = [&] {
+    control.wash(false, false);
+    return length(second() - there) > 15;
+  };
+  EXPECT_TRUE(frames_until(control, back));
+  sitting.running->stop();
+}
+
+// From the side where the drill's handle is not.
+TEST(RehearsalControl, ALeftHandHasTheSecondOneAtItsRight) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  for (const bool left : {false, true}) {
+    control.handle().set_left(left);
+    const auto so = [&] {
+      control.wash(true, false);
+      const TickRecord drill = control.rehearsal().latest(), second = control.rehearsal().latest(1);
+      const float across = drill.device.axis[0], beside = second.device.position_mm[0] - drill.device.position_mm[0];
+      return left ? across < -0.5F && beside > 1 : across > 0.5F && beside < -1;
+    };
+    EXPECT_TRUE(frames_until(control, so)) << left;
+  }
+  sitting.running->stop();
+}
+
 }  // namespace
 }  // namespace osteo

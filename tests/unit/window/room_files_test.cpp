@@ -87,6 +87,60 @@ TEST(PersonSettings, AFileThatCannotBeReadIsLeftAlone) {
   EXPECT_NE(blocked.save().find("not kept"), std::string::npos);
 }
 
+TEST(PersonSettings, ButtonsAreKeptWhereTheyAreNotAsUsual) {
+  const test::ScratchFolder scratch;
+  const fs::path file = scratch / "settings.json";
+  {
+    PersonSettings p(file);
+    p.buttons.assign(*button_named("key F13"), HandFunction::undo);
+    p.buttons.assign(button::kPedal + 1, HandFunction::suck);
+    p.buttons.clear(button::kPedal + 2);
+    p.values.left_handed = true;
+    p.values.motion_one_to = 4;
+    EXPECT_EQ(p.save(), "");
+  }
+  const auto j = nlohmann::json::parse(read_text(file));
+  EXPECT_EQ(j["buttons"], (nlohmann::json{{"key F13", "undo"}, {"pedal 2", "suck"}, {"pedal 3", "nothing"}}));
+  PersonSettings again(file);
+  EXPECT_TRUE(again.complaints().empty());
+  EXPECT_EQ(again.buttons.function(302), HandFunction::undo);
+  EXPECT_EQ(again.buttons.function(button::kPedal), HandFunction::drill);
+  EXPECT_EQ(again.buttons.function(button::kPedal + 1), HandFunction::suck);
+  EXPECT_FALSE(again.buttons.function(button::kPedal + 2));
+  EXPECT_TRUE(again.values.left_handed);
+  EXPECT_EQ(again.values.motion_one_to, 4);
+  again.buttons = HandButtons::usual();
+  EXPECT_EQ(again.save(), "");
+  EXPECT_FALSE(nlohmann::json::parse(read_text(file)).contains("buttons"));
+}
+
+TEST(PersonSettings, AWrongButtonIsToldWithItsLineAndTheOthersAreTaken) {
+  const test::ScratchFolder scratch;
+  const fs::path file = scratch / "settings.json";
+  write(file,
+        "{\"osteotome_settings\": 1,\n\"buttons\": {\n\"knee 1\": \"drill\",\n\"pedal 1\": \"fly\",\n\"pedal 2\": 3,\n\"pedal 3\": "
+        "\"undo\"},\n\"motion_one_to\": 3}");
+  PersonSettings p(file);
+  ASSERT_EQ(p.complaints().size(), 4U);
+  for (std::size_t n = 0; n < 3; ++n)
+    EXPECT_NE(p.complaints()[n].find("line " + std::to_string(n + 3)), std::string::npos) << p.complaints()[n];
+  EXPECT_NE(p.complaints()[0].find("knee 1"), std::string::npos);
+  EXPECT_NE(p.complaints()[1].find("fly"), std::string::npos);
+  EXPECT_NE(p.complaints()[3].find("1, 2, 4 or 8"), std::string::npos);
+  EXPECT_EQ(p.buttons.function(button::kPedal), HandFunction::drill);
+  EXPECT_EQ(p.buttons.function(button::kPedal + 2), HandFunction::undo);
+  EXPECT_EQ(p.values.motion_one_to, 1);
+  // What was not understood stays as the person wrote it.
+  p.values.alarms = true;
+  EXPECT_EQ(p.save(), "");
+  const auto j = nlohmann::json::parse(read_text(file));
+  EXPECT_EQ(j["buttons"]["knee 1"], "drill");
+  EXPECT_EQ(j["buttons"]["pedal 1"], "fly");
+  EXPECT_EQ(j["buttons"]["pedal 3"], "undo");
+  write(file, "{\"osteotome_settings\": 1,\n\"buttons\": [1]}");
+  EXPECT_EQ(PersonSettings(file).complaints().size(), 1U);
+}
+
 TEST(PersonSettings, OnlySoManyCasesAreRemembered) {
   const test::ScratchFolder scratch;
   PersonSettings p(scratch / "settings.json");
@@ -160,15 +214,33 @@ TEST(StartList, RecentCasesComeFirstAndTheirLastSessionToo) {
 TEST(StartList, WhatIsDroppedIsACaseOrSaysWhyNot) {
   const Folders f;
   StartList list({}, f.scratch.path());
-  EXPECT_TRUE(list.take(f.cases() / "ear"));
-  EXPECT_TRUE(list.take(f.cases() / "ear/manifest.json"));
-  EXPECT_EQ(list.take(f.cases() / "ear/sessions/2/session.json")->resume, f.cases() / "ear/sessions/2");
-  EXPECT_FALSE(list.take(f.cases() / "scan.nrrd"));
+  EXPECT_TRUE(list.take({f.cases() / "ear"}));
+  EXPECT_TRUE(list.take({f.cases() / "ear/manifest.json"}));
+  EXPECT_EQ(list.take({f.cases() / "ear/sessions/2/session.json"})->resume, f.cases() / "ear/sessions/2");
+  EXPECT_FALSE(list.take({f.cases() / "scan.nrrd"}));
   EXPECT_NE(list.message().find("osteo prepare"), std::string::npos);
-  EXPECT_FALSE(list.take(f.cases()));
+  EXPECT_FALSE(list.take({f.cases()}));
   EXPECT_EQ(list.folder(), f.cases());
-  EXPECT_FALSE(list.take(f.cases() / "nothing"));
+  EXPECT_FALSE(list.take({f.cases() / "nothing"}));
   EXPECT_NE(list.message().find("not there"), std::string::npos);
+}
+
+// Onto a session that runs: only what can be opened ends it.
+TEST(StartList, OfSeveralThingsDroppedTheFirstThatCanBeOpenedCounts) {
+  const Folders f;
+  std::string why = "before";
+  auto choice = choice_of({f.cases() / "scan.nrrd", f.cases() / "ear/sessions/2", f.cases() / "ear"}, why);
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->resume, f.cases() / "ear/sessions/2");
+  EXPECT_EQ(why, "");
+  EXPECT_FALSE(choice_of({f.cases() / "scan.nrrd", f.cases() / "nothing"}, why));
+  EXPECT_NE(why.find("scan.nrrd"), std::string::npos) << "of the first";
+  EXPECT_FALSE(choice_of(std::vector<fs::path>{}, why));
+  EXPECT_EQ(why, "");
+  StartList list({}, f.scratch.path());
+  EXPECT_TRUE(list.take({f.cases() / "scan.nrrd", f.cases() / "ear"}));
+  EXPECT_FALSE(list.take({f.cases() / "scan.nrrd", f.cases() / "empty"}));
+  EXPECT_NE(list.message().find("scan.nrrd"), std::string::npos);
 }
 
 }  // namespace

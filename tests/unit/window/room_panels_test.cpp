@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "help_page.h"
 #include "ui_style.h"
 
 namespace osteo {
@@ -73,7 +74,7 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
   struct Size {
     int width, height;
   };
-  for (const Size s : {Size{1024, 700}, {1280, 800}, {1920, 1080}, {2560, 1440}, {3840, 2160}}) {
+  for (const Size s : {Size{1024, 700}, {1280, 800}, {1360, 860}, {1920, 1080}, {2560, 1440}, {3840, 2160}}) {
     for (const double by_hand : {0.8, 1.0, 1.5}) {
       const double scale = scale_that_fits(automatic_scale(1, s.width, s.height), by_hand, s.width, s.height);
       const auto em_pixels = static_cast<int>(std::lround(kTextPixels * scale));
@@ -100,21 +101,51 @@ TEST(Panels, NothingIsCutOffAtAnySize) {
         if (!l.panel.empty()) expect_nothing_outside("panel", l.panel, false);
       }
       // Pages over the picture: within the window.
-      bool open = true;
+      HelpPage help;
+      help.show(true);
+      FirstSteps list;
+      StepFacts dusty;
+      dusty.dust = true;
+      list.see(dusty);
+      const auto six_steps = [&] { draw_first_steps(list, true); };
       frames([&] {
-        draw_help(open, s.width, s.height);
+        help.draw(s.width, s.height, six_steps);
         EXPECT_EQ(draw_question(s.width, s.height, "Bone whole again?", "This session is saved and ends.", "whole again"), 0);
       });
       const ScreenBox whole{0, 0, static_cast<float>(s.width), static_cast<float>(s.height)};
-      expect_nothing_outside("Mouse and keys", whole, true);
+      // The help is never scrolled: what one page cannot hold is on the next.
+      for (int page = 0; page < help.pages(); ++page) {
+        frames([&] { help.draw(s.width, s.height, six_steps); });
+        EXPECT_EQ(help.page(), page);
+        expect_nothing_outside("Mouse and keys", whole, false);
+        EXPECT_EQ(ImGui::FindWindowByName("Mouse and keys")->ScrollMax.y, 0);
+        help.turn(1);
+      }
       expect_nothing_outside("Bone whole again?", whole, false);
-      const ImGuiWindow* const help = ImGui::FindWindowByName("Mouse and keys");
-      EXPECT_LE(help->Pos.y + help->Size.y, whole.height);
-      if (s.width >= 1920 && by_hand == 1) {
-        EXPECT_EQ(help->ScrollMax.y, 0) << "all keys at one look";
+      if (s.width >= 1360 && by_hand <= 1) {
+        EXPECT_EQ(help.pages(), 1) << "all keys at one look";
+      } else if (by_hand <= 1) {
+        EXPECT_LE(help.pages(), 2);
       }
     }
   }
+}
+
+TEST(Help, RowsStayInTheirOrderAndHeadingsWithTheirs) {
+  const std::vector<HelpRow> rows = {{10, true}, {10}, {10}, {10, true}, {10}, {10, true}, {100}, {10}};
+  const auto columns = into_columns(rows, 0, 0, 40);
+  ASSERT_EQ(columns.size(), 4U);
+  EXPECT_EQ(columns[0].to, 3U) << "its fourth row would be a heading";
+  EXPECT_EQ(columns[1].from, 3U);
+  EXPECT_EQ(columns[1].to, 5U);
+  EXPECT_EQ(columns[2].to, 7U) << "a row that is too high still comes";
+  EXPECT_EQ(columns[3].to, 8U);
+  // The first page's columns may be lower than the others.
+  const auto lower = into_columns({{10}, {10}, {10}, {10}, {10}, {10}}, 2, 15, 40);
+  ASSERT_EQ(lower.size(), 3U);
+  EXPECT_EQ(lower[0].to, 1U);
+  EXPECT_EQ(lower[1].to, 2U);
+  EXPECT_TRUE(into_columns({}, 3, 10, 40).empty());
 }
 
 // While drilling only letters change: what is drawn where stays.

@@ -55,6 +55,42 @@ TEST(RoomLayout, BoxesTileTheWindow) {
   }
 }
 
+// What is shown for a while takes its strip from the pictures alone, and together they still tile the window.
+TEST(RoomLayout, AStripTakesFromThePicturesAlone) {
+  for (const Size s : kSizes) {
+    const auto em = static_cast<float>(kTextPixels * scale_that_fits(automatic_scale(1, s.width, s.height), 1, s.width, s.height));
+    for (const Layout wanted : {Layout::beside, Layout::operate, Layout::plan}) {
+      for (const float high : {13.5F * em, 1e5F}) {
+        const RoomLayout before = lay_out(wanted, s.width, s.height, em);
+        RoomLayout l = before;
+        const ScreenBox strip = take_strip(l, high);
+        ASSERT_FALSE(strip.empty());
+        EXPECT_EQ(l.panel, before.panel);
+        EXPECT_EQ(l.tray, before.tray);
+        EXPECT_EQ(l.state, before.state);
+        EXPECT_EQ(l.column, before.column);
+        EXPECT_EQ(strip.bottom(), l.state.y);
+        EXPECT_LE(strip.height, high);
+        auto boxes = boxes_of(l);
+        boxes.push_back(strip);
+        float area = 0;
+        for (std::size_t a = 0; a < boxes.size(); ++a) {
+          area += boxes[a].width * boxes[a].height;
+          for (std::size_t b = 0; b < a; ++b)
+            EXPECT_TRUE(boxes[a].right() <= boxes[b].x || boxes[b].right() <= boxes[a].x || boxes[a].bottom() <= boxes[b].y ||
+                        boxes[b].bottom() <= boxes[a].y)
+                << s.width << " layout " << static_cast<int>(wanted) << " boxes " << a << " " << b;
+        }
+        EXPECT_NEAR(area, static_cast<float>(s.width) * static_cast<float>(s.height), 1e-5F * area);
+        // More than half of the pictures it never takes.
+        EXPECT_GE(l.view.height * 2 + 2, before.view.height);
+      }
+    }
+    RoomLayout review = lay_out(Layout::review, s.width, s.height, em);
+    EXPECT_TRUE(take_strip(review, 13 * em).empty());
+  }
+}
+
 // The least size of all shows every layout at its usual text.
 TEST(RoomLayout, AllLayoutsFitTheSizesTheyAreFor) {
   for (const Size s : kSizes) {
@@ -240,7 +276,7 @@ TEST(ScaleBar, IsARoundNumberThatFits) {
 TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
   FirstSteps list;
   StepFacts now;
-  now.eye_distance_mm = 100;
+  now.magnification = 2;
   now.dust = true;
   now.removed_mm3 = 7;  // of the session that this one goes on from
   list.see(now);
@@ -254,8 +290,11 @@ TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
   now.undone = true;
   list.see(now);
   now.undone = false;
-  now.sucking = true;
-  now.eye_distance_mm = 80;
+  now.sucked_mm3 = 0.01;  // a sucker that was held in the air
+  list.see(now);
+  EXPECT_EQ(list.next(), 2);
+  now.sucked_mm3 = 0.3;
+  now.magnification = 3;
   list.see(now);
   EXPECT_EQ(list.next(), 4);
   now.sawn_mm3 = 3;
@@ -269,18 +308,59 @@ TEST(FirstSteps, AreTickedOffByWhatCameOfThem) {
   EXPECT_EQ(list.next(), -1);
 }
 
-TEST(FirstSteps, WithoutDustNothingIsSucked) {
+TEST(FirstSteps, WithoutDustNothingIsAskedOfTheSucker) {
   FirstSteps list;
   StepFacts now;
-  now.eye_distance_mm = 100;
-  now.sucking = true;
+  now.magnification = 2;
   list.see(now);
+  EXPECT_EQ(list.steps()[2].name(), "Suck");
   EXPECT_FALSE(list.steps()[2].possible);
-  EXPECT_FALSE(list.steps()[2].done);
-  EXPECT_NE(list.steps()[2].words.find("--dust"), std::string::npos);
+  now.removed_mm3 = 1;
+  now.undone = true;
+  list.see(now);
+  EXPECT_EQ(list.steps()[static_cast<std::size_t>(list.next())].name(), "Zoom") << "it is passed over";
 }
 
 // --- what the burr does now
+
+TEST(StateFacts, TellHowWarmItIs) {
+  Labels labels;
+  labels.frame.dims = {8, 8, 8};
+  const auto voxels = make_voxels<std::uint8_t>(512);
+  voxels[292] = 6;
+  labels.voxels = voxels;
+  labels.structures = {{6, "facial nerve", {1, 1, 0}}};
+  const StructureMap map(labels);
+  TickRecord tick;
+  StateFacts far = state_of_tick(tick, &map, 1000), near = far, hot = far, worst = far;
+  tell_warmth(far, {41.7, {{6, 40.25}}}, tick, &map);
+  EXPECT_EQ(far.warmth, "bone up to 42 C");
+  EXPECT_EQ(far.warning, "");
+  tick.structure = 6;
+  tell_warmth(near, {41.7, {{6, 40.25}}}, tick, &map);
+  EXPECT_EQ(near.warmth, "40.2 C");
+  tell_warmth(hot, {70, {{6, 47.4}}}, tick, &map);
+  EXPECT_EQ(hot.warning, map.name_of(6) + " is at 47 C: stop, and rinse");
+  EXPECT_FALSE(hot.alarm);
+  tell_warmth(worst, {70, {{6, 58}}}, tick, &map);
+  EXPECT_TRUE(worst.alarm);
+  // A case without structures; a scene without heat.
+  StateFacts none = state_of_tick({}, nullptr, 1000);
+  EXPECT_EQ(none.warmth, "");
+  tell_warmth(none, {50, {}}, {}, nullptr);
+  EXPECT_EQ(none.warmth, "bone up to 50 C");
+}
+
+TEST(StateFacts, AWarningThatLastsLetsPassWhatIsSaid) {
+  StateFacts f;
+  EXPECT_FALSE(warning_is_told(f, ""));
+  f.warning = "the shaft touches bone";
+  EXPECT_TRUE(warning_is_told(f, "saved"));
+  f.warning = "the bone is in 2 pieces";
+  f.lasts = true;
+  EXPECT_FALSE(warning_is_told(f, "saved"));
+  EXPECT_TRUE(warning_is_told(f, ""));
+}
 
 TEST(StateFacts, TellWhatTheTickTells) {
   TickRecord tick;

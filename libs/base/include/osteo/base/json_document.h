@@ -24,15 +24,16 @@ class Json {
   using List = std::vector<Json>;
   using Object = std::vector<Member>;
 
+  // What these hold is made where a member is known: clang asks for all of it.
   Json() noexcept;  ///< null
   Json(std::nullptr_t) noexcept : Json() {}
   Json(std::same_as<bool> auto flag) noexcept : value_(flag) {}
-  Json(std::signed_integral auto whole) noexcept : value_(static_cast<std::int64_t>(whole)) {}
+  Json(std::signed_integral auto whole) noexcept : value_(std::in_place_type<std::int64_t>, whole) {}
   Json(std::unsigned_integral auto whole) noexcept requires(!std::same_as<decltype(whole), bool>)
-      : value_(static_cast<std::uint64_t>(whole)) {}
-  Json(std::floating_point auto number) noexcept : value_(static_cast<double>(number)) {}
-  Json(const char* text) : value_(std::string(text)) {}
-  Json(std::string_view text) : value_(std::string(text)) {}
+      : value_(std::in_place_type<std::uint64_t>, whole) {}
+  Json(std::floating_point auto number) noexcept : value_(std::in_place_type<double>, number) {}
+  Json(const char* text) : Json(std::string(text)) {}
+  Json(std::string_view text) : Json(std::string(text)) {}
   Json(std::string text) noexcept;
   Json(List list) noexcept;
   Json(std::initializer_list<Json> items);

@@ -31,6 +31,7 @@ enum class ActionKind : std::uint32_t {
   setting,    ///< one of the haptic settings has another value
   stroke,     ///< a stroke of the burr has ended: a step that undo can take back
   posture,    ///< the patient lies otherwise: what is down for dust and water
+  guide,      ///< one hand is led by another from here on, or let go
   behind_last
 };
 

@@ -72,8 +72,6 @@ class Dust {
   /// Cells that hold water: place in the bone's grid, how full (1: to the brim), and how much of that is bone (0 to kMostSolid, more only
   /// in a film that dries).
   void visit_liquid(const std::function<void(Ijk, double, double)>& cell) const;
-  /// 0: dry, 1: a whole film or more, of the cell that a place lies in. For bone that is drawn wet. O(1).
-  [[nodiscard]] double wetness(Vec3 world_mm) const;
   /// Grows whenever anything moved, came or went.
   [[nodiscard]] std::uint64_t version() const { return version_; }
   [[nodiscard]] const BrickGrid& bone() const { return bone_; }

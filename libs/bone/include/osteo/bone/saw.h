@@ -17,7 +17,8 @@ struct SawCut {
 };
 
 /// Takes the share of each voxel that the box covers (its faces as planes within a voxel; exact but near the box's edges). Adds the changed
-/// voxels to `changed` and returns the volume removed. Cost: 2 us a brick that it meets, 10 ns one that it does not; a whole head 10 ms.
+/// voxels to `changed` and returns the volume removed. Bricks that it changes become the grid's own (BrickGrid::own_brick). Cost: 2 us a
+/// brick that it meets, 10 ns one that it does not; a whole head 10 ms.
 double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& changed);
 
 }  // namespace osteo

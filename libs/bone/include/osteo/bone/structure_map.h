@@ -35,6 +35,8 @@ class StructureMap {
   };
   /// The nearest structure. 0.05 us for each that is near.
   [[nodiscard]] Answer at(Vec3 world_mm) const noexcept;
+  /// To one structure, by its number in values(): as at(), whatever else is near; reach_mm() where it is farther.
+  [[nodiscard]] double distance_mm(std::size_t number, Vec3 world_mm) const noexcept;
   /// Between a tool's surface and the nearest structure; negative when it reaches into one. `each`, where not empty, gets the same for
   /// every structure in the order of values(), reach_mm() where it is farther. Cost: an at() for each half radius along the tool's axis and
   /// eight more; one for a ball.

@@ -51,7 +51,8 @@ struct Fixture {
 };
 
 /// Bodies and fixtures change by act() alone; densities of bodies also by the servo. act() never writes into a body that is there: where
-/// density changes it puts a new one in its place, so that whoever still reads the old is not disturbed.
+/// density changes it puts a new one in its place, so that whoever still reads the old is not disturbed. The two have the bricks that did
+/// not change in common: what is removed from the new afterwards is seen in the old there.
 class World {
  public:
   /// Names are 32 bits wide: room for BrickGrid::kMostBricks over all that the scene ever held; names are not given twice.
@@ -101,9 +102,9 @@ class World {
     std::vector<std::uint32_t> gone;
     std::vector<std::pair<VoxelKey, float>> dust;  ///< names of voxels and the density that became dust there
   };
-  /// Cost: moves nothing; plates under a millisecond; saw and split a copy of each bone they change. `components` of a body (by id), up to
-  /// date; where it is empty or gives null, split finds them itself. Never throws for what cannot be done: done is false, and nothing
-  /// changed.
+  /// Cost: moves nothing; plates under a millisecond; saw, split and undo O(bricks): they copy only those that
+  /// change otherwise than by going from one body to another. `components` of a body (by id), up to date; where it is empty or gives null,
+  /// split finds them itself. Never throws for what cannot be done: done is false, and nothing changed.
   using ComponentsOf = std::function<const LiveComponents*(std::uint32_t body)>;
   Effect act(const SceneAction& action, const ComponentsOf& components = {});
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "osteo/base/context.h"
+#include "osteo/base/guarded.h"
 #include "osteo/data/tet_mesh.h"
 #include "osteo/mesh/soup.h"
 
@@ -18,18 +19,25 @@ struct CgalRepairReport {
   std::uint64_t holes_filled = 0, holes_left = 0;
   std::uint64_t self_intersections_before = 0, self_intersections_after = 0;
 };
-/// Makes a manifold, closes holes of at most `max_hole_edges` edges (0: none), takes out self-intersections by cutting and filling
-/// again where that works. Errors: failed when no surface is left.
-[[nodiscard]] TriangleSoup repaired_by_cgal(const TriangleSoup& surface, int max_hole_edges, bool remove_self_intersections,
-                                            CgalRepairReport& report, const Context& context = {});
+/// Makes a manifold and closes holes of at most `max_hole_edges` edges (0: none). Errors: failed when no surface is left.
+[[nodiscard]] TriangleSoup holes_closed(const TriangleSoup& surface, int max_hole_edges, CgalRepairReport& report,
+                                        const Context& context = {});
+/// Triangles that meet are cut along each other in exact numbers; of the pieces those stay that bound the inside (solid_surface), facing
+/// out: overlapping bodies become one, what lay within is gone, nothing else moves. New points are rounded to double, which may leave
+/// intersections of that size; they are counted. The surface as it was when nothing intersects. (Q. Zhou et al., Mesh Arrangements for
+/// Solid Geometry, SIGGRAPH 2016.) Errors: as of solid_surface.
+[[nodiscard]] TriangleSoup intersections_resolved(const TriangleSoup& surface, CgalRepairReport& report, const Context& context = {});
 
 struct CgalMeshOptions {
   double cell_mm = 2;            ///< longest circumradius of a tetrahedron
   double facet_distance_mm = 0;  ///< farthest the boundary may be from the surface; 0: a tenth of cell_mm
   double surface_cell_mm = 0;    ///< the same as cell_mm at the surface, from where it grows inward; 0: no grading
   bool optimise = true;          ///< perturb and exude, against slivers
+  double most_tets = 5e7;        ///< more are refused before anything is done, by the volume and cell_mm
+  GuardLimits limits{};
 };
-/// Delaunay refinement (CGAL Mesh_3) of a closed surface without self-intersections. Errors: failed otherwise, naming what is wrong.
+/// Delaunay refinement (CGAL Mesh_3) of a closed surface without self-intersections, in a process of its own (run_guarded). Inside is where
+/// the winding number is not zero (solid_surface). Errors: failed otherwise, naming what is wrong; resources beyond the limits.
 [[nodiscard]] TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options, const Context& context = {});
 
 }  // namespace osteo

@@ -41,7 +41,9 @@ struct Common {
     visit({"force", "replace outputs that exist"}, p.force);
     visit({"quiet", "no progress and no notes, only errors"}, p.quiet);
     visit({"json", "print what was done as JSON on standard output"}, p.json);
-    visit({"progress", "bar, JSON lines or Slicer's form on standard error; auto: a bar on a terminal"}, p.progress);
+    visit({"progress",
+           "bar or JSON lines on standard error, Slicer's form on standard output and all notes with it; auto: a bar on a terminal"},
+          p.progress);
     visit({"seed", "of random choices", "", 0, 2147483647}, p.seed);
   }
 };

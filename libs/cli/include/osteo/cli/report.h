@@ -22,4 +22,8 @@ void print_results(const std::vector<NodeResult>& results, Invocation& invocatio
 /// The reference pages made from the declarations of `program`: file name -> content.
 [[nodiscard]] std::map<std::string, std::string> reference_pages(const Program& program);
 
+/// What an installation shares, made from the declarations: path below PREFIX/share -> content. Man pages, completion of bash, zsh and
+/// fish, and the modules of 3D Slicer (scripts, which may be run, and .xml).
+[[nodiscard]] std::map<std::string, std::string> shared_files(const Program& program);
+
 }  // namespace osteo::cli

@@ -5,10 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "osteo/devices/hid_link.h"
 #include "osteo/devices/woodenhaptics.h"
 #include "osteo/haptics/device.h"
+#include "osteo/haptics/hand_tuning.h"
 #include "osteo/rt/seqlock.h"
 
 namespace osteo {
@@ -19,26 +21,33 @@ class WorkspaceMap {
  public:
   /// `rotation`: columns are the device's axes in the scene. `scale` > 0: scene mm a device mm.
   WorkspaceMap(Vec3 place_mm, const Mat3& rotation, double scale) : place_mm_(place_mm), rotation_(rotation), scale_(scale) {}
+  /// From the next tick on, which begins where the tool is. `share` > 0: of the scale it was made with.
+  void rescale(double share) noexcept {
+    if (share == share_) return;
+    share_ = share;
+    rescaled_ = true;
+  }
   /// One tick; no allocation.
   Vec3 update(Vec3 device_mm, bool clutch) noexcept {
-    if (!started_ || clutch) {
+    if (!started_ || clutch || rescaled_) {
       if (started_) place_mm_ = last_scene_mm_;
       anchor_mm_ = device_mm;
       started_ = true;
+      rescaled_ = false;
     }
-    return last_scene_mm_ = place_mm_ + rotation_ * ((device_mm - anchor_mm_) * scale_);
+    return last_scene_mm_ = place_mm_ + rotation_ * ((device_mm - anchor_mm_) * scale());
   }
   [[nodiscard]] Vec3 last_mm() const { return started_ ? last_scene_mm_ : place_mm_; }
   [[nodiscard]] Vec3 direction(Vec3 device) const { return rotation_ * device; }
   /// A force of the scene, for the device's motors.
   [[nodiscard]] Vec3 to_device(Vec3 scene_n) const { return transposed(rotation_) * scene_n; }
-  [[nodiscard]] double scale() const { return scale_; }
+  [[nodiscard]] double scale() const { return scale_ * share_; }
 
  private:
   Vec3 place_mm_, anchor_mm_, last_scene_mm_;
   Mat3 rotation_;
-  double scale_;
-  bool started_ = false;
+  double scale_, share_ = 1;
+  bool started_ = false, rescaled_ = false;
 };
 
 /// A force that goes on by itself for a while: what the servo last said, with the plane of contact beside it, so that a late servo is
@@ -57,18 +66,44 @@ struct ForcePlane {
 class FootPedal final : HidHandler {
  public:
   explicit FootPedal(DeviceModel model, HidLink::Open open) : model_(model), link_(std::move(open), *this, 100) {}
-  [[nodiscard]] std::uint32_t pressed() const noexcept { return pressed_; }
+  /// Which of its switches are down, and count.
+  [[nodiscard]] std::uint32_t pressed() const noexcept {
+    const std::uint64_t s = state_;
+    return static_cast<std::uint32_t>(s) & ~static_cast<std::uint32_t>(s >> 32);
+  }
+  /// While it is on no switch counts; after that those that were down count once they have come up. From any one thread.
+  void hold_back(bool on) noexcept {
+    if (on == held_back_) return;
+    held_back_ = on;
+    change([on](std::uint32_t down, std::uint32_t) { return std::pair(down, on ? ~0U : down); });
+  }
+  /// Those that are down now or were since this was last asked: who looks seldom misses no short press. From any one thread.
+  [[nodiscard]] std::uint32_t pressed_since() noexcept { return pressed() | since_.exchange(0); }
   [[nodiscard]] bool connected() const noexcept { return link_.connected(); }
   [[nodiscard]] std::string trouble() const { return link_.trouble(); }
 
  private:
   void report(HidPort&, std::span<const std::byte> report) override {
     std::uint32_t pressed = 0;
-    if (decode_pedal(model_, report, pressed)) pressed_ = pressed;
+    if (decode_pedal(model_, report, pressed)) set(pressed);
   }
-  void gone() override { pressed_ = 0; }  // an unplugged pedal is not pressed
+  void gone() override { set(0); }  // an unplugged pedal is not pressed
+  void set(std::uint32_t pressed) noexcept {
+    change([&](std::uint32_t, std::uint32_t back) { return std::pair(pressed, back == ~0U ? back : back & pressed); });
+    since_ |= this->pressed();
+  }
+  template <class F>
+  void change(F&& f) noexcept {
+    std::uint64_t s = state_;
+    for (;;) {
+      const auto [down, back] = f(static_cast<std::uint32_t>(s), static_cast<std::uint32_t>(s >> 32));
+      if (state_.compare_exchange_weak(s, static_cast<std::uint64_t>(back) << 32 | down)) return;
+    }
+  }
   DeviceModel model_;
-  std::atomic<std::uint32_t> pressed_{0};
+  bool held_back_ = false;
+  std::atomic<std::uint64_t> state_{0};  // what is down, and above it what does not count
+  std::atomic<std::uint32_t> since_{0};
   HidLink link_;
 };
 
@@ -102,6 +137,35 @@ class LendsHand {
   std::atomic<bool> lent_{false};
 };
 
+/// A device whose hand works on its tool as the person wants it: scale, clutch, what drills.
+class TunedHand {
+ public:
+  explicit TunedHand(std::size_t hand) { own_.drill_switches = pedal_bit(hand); }
+  /// From any one thread.
+  void tune(const HandTuning& tuning) noexcept { given_.store({tuning, true}); }
+
+ protected:
+  ~TunedHand() = default;
+  /// As it is now; the servo's.
+  const HandTuning& tuning() noexcept {
+    if (Given now; given_.try_load(now) && now.any) own_ = now.tuning;
+    return own_;
+  }
+  /// What its own button and a pedal's switches press, with the window's keys.
+  [[nodiscard]] static std::uint8_t pedal_of(const HandTuning& t, std::uint32_t buttons, std::uint32_t switches) noexcept {
+    const bool own = (buttons & t.drill_buttons) != 0 || (switches & t.drill_switches) != 0;
+    return own ? std::max(t.full, t.pedal) : t.pedal;
+  }
+
+ private:
+  struct Given {
+    HandTuning tuning;
+    bool any = false;
+  };
+  Seqlock<Given> given_;
+  HandTuning own_;
+};
+
 /// A SpaceMouse that is not the drill: of its own thread.
 class CameraPuck final : HidHandler {
  public:
@@ -119,8 +183,8 @@ class CameraPuck final : HidHandler {
 };
 
 /// Isometric: the cap's deflection is a velocity, of the goal of a spring hand. Button 1 presses the pedal; so does a real one, by its
-/// switch pedal_bit().
-class SpaceMouseDevice final : public Device, public LendsHand, HidHandler {
+/// switch pedal_bit(); unless tuned otherwise.
+class SpaceMouseDevice final : public Device, public LendsHand, public TunedHand, HidHandler {
  public:
   /// `rotation`: columns are the desk's right, away and up in the scene. Full deflection moves 60 mm/s and turns 1.5 rad/s.
   SpaceMouseDevice(HidLink::Open open, const HandGoal& start, const Mat3& rotation, const FootPedal* pedal, std::size_t hand = 0);
@@ -150,14 +214,13 @@ class SpaceMouseDevice final : public Device, public LendsHand, HidHandler {
   GuidedHand hand_;
   Mat3 rotation_;
   const FootPedal* pedal_;
-  std::uint32_t pedal_bit_;
   HidLink link_;
 };
 
 /// Pose and force by a WoodenHaptics or Polhem. The link's thread answers each report with motor currents for the latest force, bridged by
 /// its plane of contact when the servo is late; the servo reads the latest pose. Motors rest until the servo speaks, and when it falls
-/// silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the clutch of every arm.
-class WoodenHapticsDevice final : public Device, public LendsHand, HidHandler {
+/// silent. Its button or pedal_bit() of a pedal is the pedal, bit 1 the clutch of every arm; unless tuned otherwise.
+class WoodenHapticsDevice final : public Device, public LendsHand, public TunedHand, HidHandler {
  public:
   WoodenHapticsDevice(HidLink::Open open, const WoodenHapticsGeometry& geometry, const WorkspaceMap& map, int tool, const FootPedal* pedal,
                       std::size_t hand = 0);
@@ -189,7 +252,6 @@ class WoodenHapticsDevice final : public Device, public LendsHand, HidHandler {
   WorkspaceMap map_;
   std::atomic<std::uint8_t> tool_;
   const FootPedal* pedal_;
-  std::uint32_t pedal_bit_;
   Seqlock<Pose> pose_;
   Seqlock<ForcePlane> force_;
   Pose last_pose_;      // of the servo

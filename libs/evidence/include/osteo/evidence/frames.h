@@ -29,7 +29,8 @@ class FrameMaker {
  private:
   void flush();
   void begin_frame_at(std::uint64_t tick);
-  void act(const SceneAction& action);
+  void take(const TickRecord& record);
+  [[nodiscard]] bool take(const VoxelChange& change);
 
   World world_;
   double rate_hz_;

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "osteo/evidence/metric.h"
+#include "osteo/evidence/step_clock.h"
 #include "osteo/evidence/strokes.h"
 
 namespace osteo {
@@ -49,6 +50,9 @@ class NearMetric final : public Metric {
   void frame(const EvidenceFrame& frame) override;
   void finish(const World& world, std::vector<Measured>& values, std::vector<Moment>& moments) override;
 
+  /// What "near" is, from near to far; each holds those before it.
+  static constexpr std::array<double, 4> kBandsMm{0.5, 1, 2, 4};
+
   /// A burr at work within reach of a structure, at most 100 a second.
   struct Sample {
     double t_s = 0;
@@ -60,8 +64,10 @@ class NearMetric final : public Metric {
 
  private:
   struct Of {
-    double least_mm = 1e9, near_mm3 = 0, excess_ns = 0;
-    std::uint64_t touched = 0, injured = 0, near = 0, touches = 0, last_touch = 0;
+    double least_mm = 1e9, excess_ns = 0;
+    std::uint64_t touched = 0, injured = 0, touches = 0, last_touch = 0;
+    std::array<std::uint64_t, kBandsMm.size()> near{};  // ticks of drilling within each band
+    std::array<double, kBandsMm.size()> near_mm3{};
     bool touched_before = false, touched_first = false;
     bool injured_before = false;
   };
@@ -73,7 +79,8 @@ class NearMetric final : public Metric {
   std::uint64_t ruled_ = 0, allowed_ = 0;
   std::vector<std::uint64_t> last_excess_;  // by force limit: tick of the last moment
   std::array<std::optional<Vec3>, kMostHands> last_at_;
-  std::uint64_t ticks_ = 0;
+  std::uint64_t ticks_ = 0, known_ = 0;  // of all hands; of the first
+  std::optional<StepClock> steps_;
 };
 
 }  // namespace osteo

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,19 @@ struct RemovedVoxel {
 /// to be opened, and all that nothing else led to).
 class Product {
  public:
+  /// A margin nearer to 0 than this is a draw: on a lattice laid otherwise the item may come out the other way. An item whose places would
+  /// have to be off by no more than the lattice can be (0.7 of a cube, docs/evidence.md) for that has such a margin, and says so.
+  static constexpr double kDraw = 0.2;
   static constexpr double kBallMm = 0.5, kOpenedMm = 2, kAroundMm = 5, kCoarsestMm = 0.5;
   static constexpr std::size_t kMostCells = 24'000'000;
 
-  /// `before`, `after`: World; the structures must outlive this. O(cells).
+  /// All but `removed` must outlive this. O(cells): a few bits each; distances to the cavity only where an item of the procedure asks for
+  /// them.
   Product(const World& before, const World& after, const StructureMap& structures, const Procedure& procedure,
           std::vector<RemovedVoxel> removed, const Context& context = {});
+  ~Product();
+  Product(const Product&) = delete;
+  Product& operator=(const Product&) = delete;
 
   struct Result {
     const ScaleItem* item = nullptr;
@@ -43,8 +51,9 @@ class Product {
     std::size_t evidence_count = 0;  ///< of all
     double evidence_each = 0;        ///< mm2 or mm3 that one place stands for
   };
-  /// `approach`: unit, from the bone to who drills, in the first body's frame: the middle of the cone of views of no_overhang; zero where
-  /// it is not known. `injured`: names of structures that a turning burr reached.
+  /// `item`: of the procedure. From several threads at once if wanted. `approach`: unit, from the bone to who drills, in the first body's
+  /// frame: the middle of the cone of views of no_overhang; zero where it is not known. `injured`: names of structures that a turning burr
+  /// reached.
   [[nodiscard]] Result evaluate(const ScaleItem& item, Vec3 approach, const std::vector<std::string>& injured) const;
 
   /// Of an item that asks for no more than pieces and plates.
@@ -71,11 +80,17 @@ class Product {
   [[nodiscard]] bool value_of(const std::string& name, std::uint8_t& value) const;
   [[nodiscard]] std::vector<Patch> patch_of(std::uint8_t value, const ScaleItem& item) const;
   [[nodiscard]] double cavity_distance_mm(Vec3 own_mm) const;
-  [[nodiscard]] double sample(const std::vector<float>& field, Vec3 own_mm) const;
-  [[nodiscard]] std::size_t cell(Vec3 own_mm) const;  // the nearest; frame_.voxel_count() outside
-  [[nodiscard]] Vec3 place(std::size_t cell) const;
+  [[nodiscard]] Vec3 index_of(Vec3 own_mm) const;                      // in cells
+  [[nodiscard]] bool cell(Vec3 own_mm, std::array<int, 3>& at) const;  // the nearest; false outside
+  [[nodiscard]] std::size_t cell(Vec3 own_mm) const;                   // frame_.voxel_count() outside
+  [[nodiscard]] Vec3 place(int i, int j, int k) const;
+  [[nodiscard]] std::size_t offset(int i, int j, int k) const;
   [[nodiscard]] double distance_to(std::uint8_t value, Vec3 own_mm) const;
   void keep(Result& r, Vec3 at) const;
+  // What a distance may be off by because of the lattice.
+  [[nodiscard]] double off_mm() const;
+  void settle(Result& r, bool passes_at_worst, bool passes_at_best) const;
+  static std::string joined(const std::string& a, const std::string& b);
   void exposed(const ScaleItem& item, std::uint8_t s, Result& r) const;
   void violated(const ScaleItem& item, std::uint8_t s, const std::vector<std::string>& injured, Result& r) const;
   void hole(const ScaleItem& item, std::uint8_t s, Result& r) const;
@@ -86,20 +101,17 @@ class Product {
   void followed(const ScaleItem& item, std::uint8_t s, Result& r) const;
   void margin(const ScaleItem& item, Vec3 approach, Result& r) const;
 
-  struct Box {
-    Vec3 lo{1e9, 1e9, 1e9}, hi{-1e9, -1e9, -1e9};
-  };
+  struct Lattice;  // cells and distances
+  void lay_lattice(const World& before);
+  void measure_cavity_distances(const Context& context);
   const World& after_world_;
   const StructureMap& structures_;
   const Procedure& procedure_;
   std::vector<RemovedVoxel> removed_;
   Frame frame_;
-  std::vector<std::uint8_t> before_, after_, label_, cavity_;  // bone; structure inside which a cell lies; flag
-  std::vector<float> nearest_mm_;                              // to the nearest structure of all
-  std::vector<float> to_cavity_mm_;                            // from centre to centre
-  std::array<Box, 256> boxes_;                                 // around each structure's face, by value
-  TriMesh face_;
-  std::vector<std::uint8_t> face_of_;
+  Mat3 turn_;  // of the lattice, back
+  std::unique_ptr<Lattice> cells_;
+  std::array<std::size_t, 256> number_{};  // of each structure, by value
   std::string word_;
 };
 

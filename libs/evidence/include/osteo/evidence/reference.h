@@ -48,14 +48,14 @@ struct RegionScore {
 [[nodiscard]] RegionScore score_region(const RemovedSet& session, std::span<const RemovedSet> experts, std::span<const RemovedSet> novices);
 
 /// Quantiles of a value conditional on a distance, each rising with it: the fit of least pinball loss among functions that do not fall, one
-/// step every kStepMm (pool adjacent violators on quantiles of pooled values; Robertson and Wright 1975).
+/// step every kStepMm, the lowest of equally good ones (statistics/isotonic.h).
 class IsotonicQuantile {
  public:
   static constexpr double kStepMm = 0.1;
   struct Point {
     double distance_mm = 0, value = 0;
   };
-  /// `q` in (0, 1); of several values that are one the smallest (the ceil(q n)-th). O(n log^2 n) at most.
+  /// `q` in (0, 1). O(n log n).
   IsotonicQuantile(std::span<const Point> points, double q);
   /// At a distance: of its own step, else of the next nearer one that has points, else of the next farther. 0 where there are none.
   [[nodiscard]] double at(double distance_mm) const;

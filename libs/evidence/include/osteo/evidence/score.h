@@ -1,6 +1,8 @@
 // A session scored: all metrics, the items of a scale, and the moments they come from; as JSON, a row of CSV, or lines.
 #pragma once
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -70,11 +72,22 @@ struct Score {
   [[nodiscard]] std::size_t judged() const;
 };
 
+/// What score_session sees on the way, for whoever shows it.
+struct ScoreDetail {
+  std::function<void(const EvidenceFrame&)> frame;     ///< told each frame, where set
+  std::map<VoxelKey, VisibilityMetric::Voxel> voxels;  ///< by burrs, what is gone
+  RemovedSet removed;                                  ///< by saws too
+  std::map<std::uint8_t, std::vector<NearMetric::Sample>> near;
+  Vec3 approach;  ///< ScoreKeeper::approach()
+  std::optional<World> end;
+};
+
 /// All of it. `procedure` may be null; `structures` may be null; `subject`: sessions of the reference by this one are left out (as is one
 /// that removed exactly the same voxels). Errors: corrupt (another bone), usage (a procedure that needs structures which the case does not
 /// have: says which; unless none of its structures is there, that is the procedure of another case).
 [[nodiscard]] Score score_session(const SessionReader& session, World begin, const StructureMap* structures, const Procedure* procedure,
-                                  const Reference* reference, const std::string& subject, const Context& context = {});
+                                  const Reference* reference, const std::string& subject, const Context& context = {},
+                                  ScoreDetail* detail = nullptr);
 /// A session of a reference, read. The bone has to be the same.
 [[nodiscard]] Reference::One read_reference(const SessionReader& session, World begin, const StructureMap* structures,
                                             const ReferenceSession& which, const Context& context = {});

@@ -26,7 +26,11 @@ using VoxelKey = std::uint32_t;
 /// 0.2 mm over 820 mm each way), 2^17 - 1 of them along an axis.
 /// One thread writes (`set`), others may read at the same time (`at`): each value is a relaxed atomic, so a reader sees old
 /// or new values, never torn ones.
-/// Memory: 4 bytes a voxel of each brick, plus 4 bytes for each brick of the bounding box.
+/// A copy has values of its own; sharing() gives a grid that has all bricks in common with this one, until one of the two takes some for
+/// itself (own_brick, empty_bricks) or from elsewhere (share_brick). What is written into a brick is seen in all grids that have it.
+/// Memory: 4 bytes a voxel of each brick, shared ones once, 28 bytes a brick, and 4 for each brick of the bounding box. Bricks that are
+/// made empty cost no memory until something is written into them. What a grid was made with is given back when none of its bricks is in
+/// use any more; bricks that were made its own one by one.
 class BrickGrid {
  public:
   static constexpr int kEdge = 8;
@@ -65,7 +69,9 @@ class BrickGrid {
     const int o = static_cast<int>(key % kVoxels);
     return {b.i * 8 + (o & 7), b.j * 8 + (o >> 3 & 7), b.k * 8 + (o >> 6)};
   }
-  [[nodiscard]] float value(VoxelKey key) const { return std::atomic_ref<float>(values_[key]).load(std::memory_order_relaxed); }
+  [[nodiscard]] float value(VoxelKey key) const {
+    return std::atomic_ref<float>(bricks_[key / kVoxels].get()[key % kVoxels]).load(std::memory_order_relaxed);
+  }
   [[nodiscard]] float at(int i, int j, int k) const {
     const VoxelKey key = find(i, j, k);
     return key == kNone ? 0.0F : value(key);
@@ -77,10 +83,22 @@ class BrickGrid {
     return at(round(x.x), round(x.y), round(x.z));
   }
   /// The 512 values of a brick, x fastest, for the thread that writes (or when nobody does): plain loads, so vectors.
-  [[nodiscard]] const float* values_of_brick(std::uint32_t brick) const {
-    return values_.get() + static_cast<std::size_t>(brick) * kVoxels;
+  [[nodiscard]] const float* values_of_brick(std::uint32_t brick) const { return bricks_[brick].get(); }
+  void set(VoxelKey key, float v) {
+    std::atomic_ref<float>(bricks_[key / kVoxels].get()[key % kVoxels]).store(v, std::memory_order_relaxed);
   }
-  void set(VoxelKey key, float v) { std::atomic_ref<float>(values_[key]).store(v, std::memory_order_relaxed); }
+
+  /// The same voxels, none of them copied. O(bricks).
+  [[nodiscard]] BrickGrid sharing() const;
+  /// From now on this grid has the brick for itself, with the values it had; or, of empty_bricks, with zeros. While another thread reads
+  /// or writes this grid, call it on a grid that shares with it, not on this one.
+  void own_brick(std::uint32_t brick);
+  void empty_bricks(std::span<const std::uint32_t> bricks);
+  /// From now on the brick is the same as brick `from` of `other`.
+  void share_brick(std::uint32_t brick, const BrickGrid& other, std::uint32_t from) { bricks_[brick] = other.bricks_[from]; }
+  [[nodiscard]] bool shares_brick(std::uint32_t brick, const BrickGrid& other, std::uint32_t from) const {
+    return bricks_[brick] == other.bricks_[from];
+  }
 
   /// Copies the block of voxels [lo, lo + n) into `out`, x fastest; voxels that are not stored are 0.
   void read_block(Ijk lo, std::array<int, 3> n, float* out) const;
@@ -94,8 +112,8 @@ class BrickGrid {
   Frame frame_;
   std::array<std::uint32_t, 3> extent_{0, 0, 0};  // bricks along each axis
   std::vector<std::uint32_t> table_;
-  std::vector<Ijk> origins_;  // in bricks
-  std::unique_ptr<float[]> values_;
+  std::vector<Ijk> origins_;                    // in bricks
+  std::vector<std::shared_ptr<float>> bricks_;  // kVoxels values each; those that were made together keep one block alive
 };
 
 /// Whether so many bricks, or bricks within a box of so many along each axis, are more than a BrickGrid takes.

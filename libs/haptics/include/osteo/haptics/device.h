@@ -43,6 +43,8 @@ class Device {
   virtual Led led() noexcept { return Led::no; }
   /// The force of this tick and the plane of contact it stems from (normal zero without), for devices that hold it longer than a tick.
   virtual void feel(Vec3 /*force_n*/, Vec3 /*normal*/, double /*stiffness_n_per_mm*/) noexcept {}
+  /// The device that a person holds, where this one only stands before it (LedDevice); else itself.
+  [[nodiscard]] virtual Device& held() noexcept { return *this; }
   /// What the guard needs to know of it.
   [[nodiscard]] virtual DeviceTraits traits() const { return {}; }
   /// What went wrong in threads of its own, in words; empty: nothing. From any thread.

@@ -60,6 +60,7 @@ struct HapticSetup {
   std::string structures;        ///< hash of the structures at risk that are watched; empty: none
   std::vector<Vec3> curve;       ///< points of a virtual fixture for hand 0, in mm; fewer than 2: none
   CurveConstraintParams curve_params;
+  std::string texture_json;    ///< of what tools slide over, as parse_texture reads it; empty: none, and nothing is spent on it
   std::string vibration_json;  ///< a spectrum as parse_vibration reads it; empty: the built-in model
 
   [[nodiscard]] std::size_t hands() const { return 1 + more_devices.size(); }

@@ -49,6 +49,9 @@ class HapticRenderer {
   /// What soft tissue pushes a hand's tool with from now on (ActionKind::soft_push): a plane near the tool, made by whoever moves the
   /// tissue, felt at full rate. Of a hand that is not there: nothing.
   void push(const SceneAction& soft_push) noexcept;
+  /// A hand is led by another from now on (ActionKind::guide), by GuideLaw; of the leader's force what it was in the tick before. The hand
+  /// that leads says in its samples how much (LeadBits). Of hands that are not there: nothing. Nobody led costs a comparison a tick.
+  void guide(const SceneAction& action) noexcept;
   /// Nothing is removed while held.
   void hold(bool on) noexcept;
   /// Other settings from the next step on, made safe as at the start. No allocation.
@@ -82,6 +85,7 @@ class HapticRenderer {
  private:
   struct Common;
   void watch(HandRenderer& hand) noexcept;
+  void lead(std::span<const DeviceSample> samples) noexcept;
 
   const HapticSetup setup_;
   Anatomy anatomy_;
@@ -93,6 +97,7 @@ class HapticRenderer {
   std::vector<double> clearances_;       // in the order of the structures' values
   std::vector<std::uint8_t> met_;        // of each structure in this tick: 1 touched, 2 injured
   std::vector<StructureEvents> events_;  // the same
+  bool any_led_ = false;
   friend class HandRenderer;
 };
 

@@ -21,9 +21,13 @@ struct DeviceSample {
   std::uint8_t pedal = 0;              ///< 0: up, 255: down as far as it goes, which a mere button is at once
   std::uint8_t tool = 0;               ///< index in instrument_library()
   std::uint8_t age_ms = 0;             ///< since the device last reported; 255: longer, or unplugged
-  std::uint8_t buttons = 0;            ///< of the device, beyond the pedal's
+  std::uint8_t buttons = 0;            ///< of the device, beyond the pedal's; of a hand that leads another: kLeadStrength, kLeadStill
 };
 static_assert(sizeof(DeviceSample) == 28);
+
+/// DeviceSample::buttons of a hand that leads another (ActionKind::guide): how much of the pull there is, 127 all of it; and that for this
+/// hand time stands still: it is where it is told to be, but meets no bone and takes none, and goes on later as if nothing had been.
+enum LeadBits : std::uint8_t { kLeadStrength = 127, kLeadStill = 128 };
 
 /// What happened in a tick, as bits of TickRecord::flags.
 enum TickFlag : std::uint32_t {
@@ -42,6 +46,7 @@ enum TickFlag : std::uint32_t {
   kPlateInHand = 4096,       ///< the hand holds a plate, not its instrument
   kSoftContact = 8192,       ///< soft tissue pushes the tool
   kNoRoom = 16384,           ///< bone that the burr covers in part was left: too many voxels are (Grains::room)
+  kGuided = 32768,           ///< another hand led it: its force is not its own alone
 };
 
 /// One tick of one hand, as it is written to session files (little endian). With several hands each tick has one of these for each, in

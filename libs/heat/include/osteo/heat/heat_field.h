@@ -33,11 +33,13 @@ struct HeatLedger {
   double forgotten_j = 0;  ///< of bricks that had become as cool as the rest
 };
 
-/// Finite volumes in cubes of `cell_mm`, explicit in time. Between two cells heat goes through as much matter as the emptier one has, so a
-/// boundary inside cells needs no smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where heat
-/// comes and forgotten where nothing is warmer or cooler than kLeastK, so the cost follows what is warm: about 6 ns a cell and step.
-/// Deterministic: the same calls give the same bits. Temperatures are differences to the body's, K.
-/// Error against analytic solutions, at 0.25 mm: docs/heat.md.
+/// Finite volumes in cubes of `cell_mm`, explicit in time. Each cell exchanges heat with its 6 neighbours at faces and 12 at edges, 2 to 1
+/// (the 19-point Laplacian, whose error has no direction); at a sixth of h2 / alpha a step's own error takes that one away, so that inside
+/// one material the method is of fourth order in space. Where one of the four cells about an edge is emptier, that much goes through faces
+/// only: a wall inside the lattice is exact for heat along it. Between two cells heat goes through as much matter as the emptier one has,
+/// so a boundary inside cells needs no smaller step, and what one loses the other gains to the last bit. Bricks of 8^3 cells are made where
+/// heat comes and forgotten where nothing is warmer or cooler than kLeastK, so the cost follows what is warm. Deterministic: the same calls
+/// give the same bits. Temperatures are differences to the body's, K. Error against analytic solutions and cost, at 0.25 mm: docs/heat.md.
 class HeatField {
  public:
   /// `matter` is asked once for each cell of a brick that is made; it must answer for any cell and see what set_matter() told.
@@ -60,7 +62,7 @@ class HeatField {
   void cool(const Ball& where, double film_w_per_m2_k, double water_k);
   /// Bone went (or came, by undo, cool): it takes its heat along.
   void set_matter(Ijk cell, HeatMatter now);
-  /// On by seconds, in as many steps as stability asks for.
+  /// On by seconds, in as many equal steps as stability asks for. Most exact when that is a whole number of longest_step_s().
   void step(double seconds);
 
   /// Over the body's temperature; 0 where nothing is warm.
@@ -73,8 +75,8 @@ class HeatField {
   [[nodiscard]] double hottest() const;
   [[nodiscard]] std::size_t bricks() const { return bricks_.size(); }
   [[nodiscard]] double cell_mm() const { return cell_mm_; }
-  /// The longest step that is stable with a film so strong, s.
-  [[nodiscard]] double longest_step_s(double film_w_per_m2_k) const;
+  /// The longest step that is stable, under water too, s: h2 / (6 alpha) of what conducts best.
+  [[nodiscard]] double longest_step_s() const;
   /// Bricks (cells / 8) that are kept, in a fixed order.
   [[nodiscard]] std::vector<Ijk> warm_bricks() const;
   /// The 512 temperatures of a kept brick, x fastest; 0 in air. Until the next call that changes anything.
@@ -84,24 +86,27 @@ class HeatField {
 
  private:
   static constexpr int kCells = 512;
+  static constexpr int kLinks = 729;  // 9^3: from the layer before the brick's own cells on
   struct Brick {
-    Ijk at;                          // in bricks
-    std::array<Brick*, 6> beside{};  // -x +x -y +y -z +z; null: none is made
+    Ijk at;                           // in bricks
+    std::array<Brick*, 27> around{};  // x fastest, itself in the middle; null: none is made
     std::array<double, kCells> kelvin{}, change{};
-    std::array<float, kCells> capacity{};             // J/K
-    std::array<float, kCells> conducts{};             // W/K through a whole face
-    std::array<std::array<float, kCells>, 3> face{};  // W/K to the cell at +x, +y, +z
-    std::array<float, kCells> share{};                // of the cell that is matter
-    std::array<double, kCells> source{};              // J, during the next step
-    std::array<float, kCells> film{}, water{};        // W/K; K: of the next step
-    bool heated = false, cooled = false;
+    std::array<float, kCells> capacity{};       // J/K
+    std::array<float, kCells> conducts{};       // W/K through a whole face
+    std::array<float, kCells> share{};          // of the cell that is matter
+    std::array<double, kCells> source{};        // J, during the next step
+    std::array<float, kCells> film{}, water{};  // W/K; K: of the next step
+    // W/K to the cell at +x, +y, +z, and along both diagonals of the square that begins there, normal to x, y, z.
+    std::array<std::array<float, kLinks>, 3> face{}, diagonal{};
+    bool heated = false, cooled = false, links_old = true;
   };
   using Key = std::uint64_t;
   [[nodiscard]] static Key key_of(Ijk brick);
   [[nodiscard]] const Brick* find(Ijk brick) const;
   Brick& make(Ijk brick);
   void fill(Brick& b, int cell, HeatMatter m) const;
-  void join(Brick& b, int axis);
+  static void link(Brick& b);
+  static void links_are_old_around(Brick& b);
   void heat(double share);
   void conduct(double seconds);
   void wake_and_forget();
@@ -112,7 +117,6 @@ class HeatField {
   MatterAt matter_;
   std::map<Key, std::unique_ptr<Brick>> bricks_;
   HeatLedger ledger_;
-  double strongest_film_ = 0;
 };
 
 }  // namespace osteo

@@ -50,7 +50,7 @@ struct EnumNames<Morphology> {
 [[nodiscard]] Picture thumbnail(const Image& image, SliceAt slice, int pixels, double lo, double hi);
 
 /// Values on a plane, rows from the top.
-struct Plane {
+struct PlaneImage {
   int width = 0, height = 0;
   std::vector<float> values;
 };
@@ -60,9 +60,9 @@ struct PlaneMatch {
   double score = 0;       ///< phase: height of the peak; ECC: correlation. 0 where nothing was found
 };
 /// A shift alone, by phase correlation under a Hann window (C. Kuglin, D. Hines 1975). Both must have one size (Error usage).
-[[nodiscard]] PlaneMatch match_by_phase(const Plane& first, const Plane& second);
+[[nodiscard]] PlaneMatch match_by_phase(const PlaneImage& first, const PlaneImage& second);
 /// Turn and shift from a guess that is right to some pixels and 15 degrees, by enhanced correlation (G. Evangelidis, E. Psarakis, IEEE
 /// TPAMI 2008). Score 0 where it does not settle.
-[[nodiscard]] PlaneMatch match_by_correlation(const Plane& first, const Plane& second, const PlaneMatch& guess);
+[[nodiscard]] PlaneMatch match_by_correlation(const PlaneImage& first, const PlaneImage& second, const PlaneMatch& guess);
 
 }  // namespace osteo

@@ -67,17 +67,11 @@ class PenLink {
   std::thread thread_;        // last: it uses all the others
 };
 
-/// Keys and buttons that stand in for a foot pedal.
-struct HandKeys {
-  std::atomic<bool> drill{false}, clutch{false};
-  void press(bool pedal) noexcept { drill = pedal; }
-};
-
 /// The pen's tip is the goal of a spring hand, so that the drill rests on bone although nothing holds the pen back: a device of pose only.
 /// While the pen is out of sight for longer than two and a half pictures (and the camera's delay) the drill stops, force fades, nothing
 /// pulls; seen again, it takes hold where the tool is, and the handle turns to the pen's at no more than 2 rad/s. Bit 1 of a pedal (the
-/// middle one), or of its keys, is the clutch: the pen moves alone. pedal_bit() of a pedal, or of its keys, is the drill.
-class MarkerDevice final : public Device {
+/// middle one) is the clutch: the pen moves alone. pedal_bit() of a pedal is the drill; keys of the window, and other switches, as tuned.
+class MarkerDevice final : public Device, public TunedHand {
  public:
   /// `scene_from_camera`: columns are the camera's axes in the scene. `scale`: scene mm for a mm of the hand. `start`: where the drill
   /// waits until the pen is seen. `pedal` may be null.
@@ -87,8 +81,6 @@ class MarkerDevice final : public Device {
   void set_tool(std::uint8_t tool) noexcept override { tool_ = tool; }
   [[nodiscard]] DeviceTraits traits() const override { return SpringHand::traits(); }
   [[nodiscard]] std::string trouble() const override { return link_->trouble(); }
-  /// Whoever keeps them may press them as long as they are there, from any thread.
-  [[nodiscard]] std::weak_ptr<HandKeys> keys() const { return keys_; }
   /// Without a picture for longer than this the pen is out of sight.
   [[nodiscard]] double patience_ms() const { return patience_ms_; }
 
@@ -98,9 +90,7 @@ class MarkerDevice final : public Device {
   Mat3 scene_from_camera_;
   double scale_, patience_ms_;
   const FootPedal* pedal_;
-  std::uint32_t pedal_bit_;
   std::atomic<std::uint8_t> tool_;
-  std::shared_ptr<HandKeys> keys_ = std::make_shared<HandKeys>();
   // The servo's.
   PenLink::State last_;
   WorkspaceMap map_;

@@ -35,6 +35,7 @@ struct RepairOptions {
   bool drop_unsound = true;      ///< points that are not finite and what names them
   double min_body_area_mm2 = 0;  ///< smaller bodies are dropped
   bool keep_largest = false;     ///< only the body of most area
+  bool turn_bodies = true;       ///< closed bodies that face inward and are no cavities are turned round
 };
 struct RepairReport {
   std::uint64_t unsound = 0, welded = 0, degenerate = 0, duplicates = 0, flipped = 0, turned_bodies = 0, dropped_bodies = 0;

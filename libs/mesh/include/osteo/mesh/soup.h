@@ -32,6 +32,8 @@ struct BoxMm {
 /// Of the points that triangles use.
 [[nodiscard]] BoxMm bounds_of(const TriangleSoup& soup);
 
+/// Without the points that no triangle uses; the others in order of first use.
+[[nodiscard]] TriangleSoup compacted(const TriangleSoup& soup);
 /// Rounds coordinates to float; unused points are left out.
 [[nodiscard]] TriMesh mesh_of(const TriangleSoup& soup);
 

@@ -1,7 +1,9 @@
 // A printed report as plain values: what it says, in the order in which it is read. Written once as HTML and once as PDF.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -71,11 +73,79 @@ struct Bars {
   std::string axis;
   double height_mm = 34;
 };
+/// Points, lines, bands and boxes over two axes, which become a Drawing. What lies outside the axes is not drawn.
+struct Plot {
+  using At = std::array<double, 2>;
+  struct Axis {
+    double from = 0, to = 1, tick = 0.5;
+    std::string name;
+    std::vector<std::pair<double, std::string>> named;  ///< in place of numbers: where, and what
+  };
+  struct Points {
+    std::vector<At> at;
+    Tone tone = Tone::plain;
+    bool hollow = false;
+  };
+  struct Line {
+    std::vector<At> at;
+    Tone tone = Tone::plain;
+    bool dashed = false;
+  };
+  struct Area {
+    std::vector<At> at;  ///< its corners
+    Tone tone = Tone::quiet;
+  };
+  /// Upright: whiskers from `lo` to `hi`, a box from `q1` to `q3`.
+  struct Box {
+    double x = 0, width = 0.5, lo = 0, q1 = 0, median = 0, q3 = 0, hi = 0;
+  };
+  std::string id, title;  ///< the title is also what is read aloud
+  Axis x, y;
+  std::vector<Area> areas;
+  std::vector<Box> boxes;
+  std::vector<Line> lines;
+  std::vector<Points> points;
+  double height_mm = 48;
+};
 /// The line to sign: empty texts are lines to write on. Always of the same height, so that what is signed looks as before.
 struct Signature {
   std::string by, date, note;
   std::string state;  ///< "not approved", "approved", "approved before the last change: no longer valid"
   Tone tone = Tone::plain;
+};
+/// Lines, areas and words on a plane of `width` by `height` units, drawn as wide as there is room; y downwards.
+struct Drawing {
+  using Colour = std::array<std::uint8_t, 3>;
+  struct Path {
+    std::vector<std::array<double, 2>> points;
+    std::optional<Colour> stroke, fill;  ///< an area is closed by itself
+    double width = 1;                    ///< of the stroke
+    double opacity = 1;
+    bool dashed = false;
+  };
+  struct Text {
+    double x = 0, y = 0;  ///< of its baseline
+    std::string text;
+    double size = 10;
+    Colour colour{28, 33, 41};
+    int align = -1;  ///< -1: begins at x, 0: its middle is there, 1: ends there
+    bool bold = false;
+  };
+  struct Dot {
+    double x = 0, y = 0, radius = 1;
+    Colour colour{28, 33, 41};
+    bool hollow = false;
+  };
+  std::string id;
+  std::string alt;  ///< what it shows, read aloud
+  double width = 600, height = 200;
+  std::vector<std::variant<Path, Text, Dot>> marks;  ///< the later above the earlier
+  std::string caption;
+
+  void line(std::vector<std::array<double, 2>> points, Colour colour, double stroke_width = 1, bool dashed = false);
+  void area(std::vector<std::array<double, 2>> points, Colour colour, double opacity = 1);
+  void box(double x, double y, double w, double h, Colour colour, double opacity = 1);
+  void text(double x, double y, std::string what, double size, Colour colour, int align = -1, bool bold = false);
 };
 struct Columns {
   std::vector<SheetBlocks> columns;
@@ -87,7 +157,7 @@ struct PageBreak {};
 
 struct SheetBlock {
   std::variant<sheet::Heading, sheet::Paragraph, sheet::Band, sheet::Facts, sheet::Table, sheet::Pictures, sheet::Bars, sheet::Signature,
-               sheet::Columns, sheet::PageBreak>
+               sheet::Drawing, sheet::Plot, sheet::Columns, sheet::PageBreak>
       is;
 };
 
@@ -105,6 +175,14 @@ struct Sheet {
 /// PDF 1.5 with the fonts it uses and text that can be selected. Same sheet and same fonts on the machine, same bytes: it holds no date.
 /// Error(failed) where the machine has no font at all.
 [[nodiscard]] std::string sheet_pdf(const Sheet& sheet);
+
+/// Parts of pages that are not sheets. A drawing as SVG, as wide as what it stands in; with its caption below it.
+[[nodiscard]] std::string svg_of(const sheet::Drawing& drawing);
+/// Of text and of attributes in double quotes; what is not UTF-8 is U+FFFD.
+[[nodiscard]] std::string html_escaped(std::string_view text);
+[[nodiscard]] std::string base64_of(std::string_view bytes);
+/// "data:image/png;base64,..."
+[[nodiscard]] std::string png_url_of(const Picture& picture);
 
 /// The HTML as it would be without the text of its signature, to tell whether anything else changed.
 [[nodiscard]] std::string html_without_signature(std::string_view html);

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -49,6 +50,8 @@ class HeatReader final : public Reader {
     double now_c = 0;             ///< the warmest place
     double share_over_limit = 0;  ///< of its face, with more than kBoneLimitCem43
   };
+  /// Where cells are warm, as balls of the world around their bricks; nothing else is warmer or cooler than the body.
+  void for_warm_places(const std::function<void(Vec3 centre_mm, double radius_mm)>& f) const;
   /// By value in the label map, those whose face became warm at all.
   [[nodiscard]] std::map<std::uint8_t, OfStructure> structures() const;
   [[nodiscard]] double hottest_c() const { return hottest_c_; }  ///< of any bone so far
@@ -92,5 +95,8 @@ class HeatReader final : public Reader {
   };
   std::vector<Place> places_;
 };
+
+/// What it found, a line each: warmest bone and where its heat went; each structure that became warm; none at risk. For people.
+[[nodiscard]] std::vector<std::string> told(const HeatReader& heat, const StructureMap* structures);
 
 }  // namespace osteo

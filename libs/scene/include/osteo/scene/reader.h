@@ -28,8 +28,8 @@ class Reader {
   }
   /// At the beginning of its tick: after all ticks before it, before what changes in it. scene_changed() calls come in the same order.
   virtual void action(const SceneAction& action) { static_cast<void>(action); }
-  /// What was recorded of a hand in a tick, and the voxels it changed (the density before each change too). Ticks in order, of each tick the
-  /// hands in theirs.
+  /// What was recorded of a hand in a tick, and the voxels it changed (the density before each change too). Ticks in order, of each tick
+  /// the hands in theirs.
   virtual void tick(const TickRecord& record, std::span<const VoxelChange> changes) {
     static_cast<void>(record);
     static_cast<void>(changes);
@@ -49,8 +49,9 @@ class ReaderHub {
   void remove(Reader& reader);
 
   /// Tells what the stream holds, then update() where that was anything. Where the stream had to leave something out, resync() comes
-  /// before that. Returns the records taken.
-  std::size_t drain();
+  /// before that. Returns the records taken. With `about` (the clock's, ms; it changes no result, only when it comes) it may leave some in
+  /// the stream: for whoever holds a lock that others wait for.
+  std::size_t drain(std::optional<double> about_ms = {});
   /// The world was changed by an action that the stream will tell of; drained as far as it went before.
   void scene_changed(const World::Effect& effect);
   /// The servo has ended after so many ticks, and drain() took what there was: actions behind the last tick are told, and if the last

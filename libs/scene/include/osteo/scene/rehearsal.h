@@ -30,6 +30,7 @@ struct RehearsalOptions {
   ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
   std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
+  std::function<void(const std::string& kind, const std::string& json)> heard;  ///< each note too, in the thread that leaves it
 };
 
 /// An action that was refused, or done otherwise than asked.
@@ -92,8 +93,19 @@ class Rehearsal {
   /// Same bone, surface and session as by the clock. Errors as stop().
   RehearsalSummary run_to_end(const Context& context);
 
+  /// In place of start() and run_to_end(), for a session that runs elsewhere: its next tick is done here, with what was done at its
+  /// beginning, and the devices have its samples. From one thread, until stop(), which comes after its last call. The same bits as there.
+  void step_elsewhere(std::span<const SceneAction> actions);
+  /// What was done behind its last tick; stop() comes next.
+  void end_elsewhere(std::span<const SceneAction> behind);
+  /// Readers are told what they were not told yet; from the thread of step_elsewhere(), which does so every 16 ticks by itself.
+  void catch_up();
+  /// Where it runs elsewhere: who sits here is shown first, by what `now` tells of the hand; in place of `hand`, which is told in its
+  /// place. `device` is what this hand is moved by. All must outlive this, or the next call; null: the hands as they are.
+  void seat(Device* device, const Seqlock<TickRecord>* now, std::size_t hand);
+
   /// From any thread: soon, in the order they were asked for. One that waits is replaced by the next where that is enough
-  /// (ActionRow::last_counts).
+  /// (ActionRow::last_counts). What runs elsewhere is changed there alone: refused.
   void act(const SceneAction& action);
   /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
   void note(const std::string& kind, const std::string& json);
@@ -107,7 +119,7 @@ class Rehearsal {
   [[nodiscard]] std::string trouble() const;
 
   /// Latest tick of a hand, for display.
-  [[nodiscard]] TickRecord latest(std::size_t hand = 0) const { return latest_[hand].load(); }
+  [[nodiscard]] TickRecord latest(std::size_t hand = 0) const;
   [[nodiscard]] double removed_mm3() const { return operation_.removed_mm3(); }
   /// Soft tissue cut off; 0 where the scene has none.
   [[nodiscard]] double tissue_mm3() const { return tissue_mm3_; }
@@ -120,7 +132,7 @@ class Rehearsal {
   /// Edge of the finest voxels in the scene.
   [[nodiscard]] double finest_voxel_mm() const { return finest_voxel_mm_; }
   [[nodiscard]] std::size_t hands() const { return devices_.size(); }
-  [[nodiscard]] Device& device(std::size_t hand = 0) { return *devices_[hand]; }
+  [[nodiscard]] Device& device(std::size_t hand = 0) { return hand == 0 && seat_ != nullptr ? seat_->held() : devices_[hand]->held(); }
   /// The settings as the last action has left them.
   [[nodiscard]] HapticsParams settings() const;
   /// Null where the scene has none; under look() only.
@@ -139,7 +151,7 @@ class Rehearsal {
  private:
   void follow();
   void follow_on();
-  std::size_t drain();
+  std::size_t drain(std::optional<double> about_ms = {});
   bool perform(const SceneAction& action, bool live);
   std::optional<SceneAction> move_soft();
   bool run_on(const Context& context);
@@ -163,7 +175,11 @@ class Rehearsal {
   std::string refused_;
   std::vector<ActionNote> notes_;
   std::uint64_t soft_tick_ = 0;  // of the next update of soft tissue
-  std::atomic<bool> stop_{false};
+  std::atomic<bool> stop_{false}, elsewhere_{false};
+  std::deque<SceneAction> done_elsewhere_;  // whose tick has come
+  Device* seat_ = nullptr;
+  const Seqlock<TickRecord>* seat_now_ = nullptr;
+  std::size_t seat_hand_ = 0;
   std::exception_ptr failure_;  // of the follower's thread, or of what ran in this one
   std::optional<RehearsalSummary> summary_;
   std::thread thread_;

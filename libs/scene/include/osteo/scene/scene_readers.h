@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "osteo/scene/dust_reader.h"
+#include "osteo/scene/heat_reader.h"
 #include "osteo/scene/pieces_reader.h"
 #include "osteo/scene/surface_reader.h"
 #include "osteo/scene/tool_counts.h"
@@ -13,6 +14,7 @@ struct ReaderList {
   bool surface = true;
   bool pieces = false;
   bool dust = false;
+  bool heat = false;
 };
 
 /// What is not listed is null, and costs nothing.
@@ -20,10 +22,12 @@ struct SceneReaders {
   std::unique_ptr<SurfaceReader> surface;
   std::unique_ptr<PiecesReader> pieces;
   std::unique_ptr<DustReader> dust;
+  std::unique_ptr<HeatReader> heat;
   ToolCounts tools;
 
-  /// For this scene as it is.
-  SceneReaders(const World& world, const ReaderList& list, double rate_hz, const Context& context);
+  /// For this scene as it is. `structures` (null: none), of which heat tells, must outlive this.
+  SceneReaders(const World& world, const ReaderList& list, double rate_hz, const Context& context,
+               const StructureMap* structures = nullptr);
   /// All of them, which are of the hub's scene as it is.
   void add_to(ReaderHub& hub);
   /// Empty where the surface is not listed.

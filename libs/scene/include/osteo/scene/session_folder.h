@@ -13,6 +13,8 @@ struct SessionFolder {
   std::filesystem::path case_folder;
   std::filesystem::path resumed_from;  ///< the session whose end is this one's beginning, or empty
   std::string approval = {};           ///< who stood for the case when it began, in words; empty: not known
+  double resumed_at_s = 0;             ///< of that session: this one begins with the scene of then; 0: of its end
+  std::string guided = {};             ///< how another hand led or showed it, in words; empty: nobody did
 
   [[nodiscard]] std::filesystem::path stream() const { return folder / "stream.oss"; }
   [[nodiscard]] std::filesystem::path summary() const { return folder / "summary.json"; }
@@ -20,8 +22,10 @@ struct SessionFolder {
 
 /// Makes a new, empty folder: `wanted`, or when that is empty CASE/sessions/N with the first free N. Writes session.json,
 /// which ties it to the case by relative paths and says whether the case was approved. Error(cannot_write) when `wanted` holds something.
+/// `guided`: words for a session in which another hand leads or is shown. `resumed_at_s`: SessionFolder::resumed_at_s.
 [[nodiscard]] SessionFolder create_session_folder(const std::filesystem::path& wanted, const std::filesystem::path& case_folder,
-                                                  const std::filesystem::path& resumed_from);
+                                                  const std::filesystem::path& resumed_from, const std::string& guided = {},
+                                                  double resumed_at_s = 0);
 
 /// Errors: no_input, corrupt. `case_folder` overrides what the session says when it is not empty.
 [[nodiscard]] SessionFolder open_session_folder(const std::filesystem::path& folder, const std::filesystem::path& case_folder = {});

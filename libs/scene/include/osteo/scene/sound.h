@@ -30,6 +30,7 @@ class SoundTracker {
   [[nodiscard]] const SoundState& state() const { return state_; }
 
  private:
+  [[nodiscard]] bool instruments_touch(std::uint64_t tick) noexcept;
   std::set<std::uint32_t> soft_;
   double rate_hz_;
   bool alarms_;
@@ -37,6 +38,9 @@ class SoundTracker {
   bool standing_suction_ = false, standing_water_ = false;  // by action, beside the burr
   std::uint64_t injured_until_ = 0, touched_until_ = 0;
   double thickness_mm_[kMostHands] = {};
+  TickRecord last_[kMostHands];  // of each hand that holds an instrument
+  bool has_[kMostHands] = {};
+  bool touching_ = false;
 };
 
 /// The sound of a rehearsal while it runs: an end of its stream for itself, drained by whoever asks for samples, such as the thread of a

@@ -28,7 +28,7 @@ struct SoundState {
   static constexpr std::size_t kMostVoices = 4;
   std::array<SoundVoice, kMostVoices> voices;
   double water = 0;    ///< 0 to 1: the share of what a sucker draws that is water
-  double metal_n = 0;  ///< with which a plate meets bone; each beginning of it is heard
+  double metal_n = 0;  ///< with which a plate meets bone, or two instruments each other; each beginning of it is heard
   SoundAlarm alarm = SoundAlarm::none;
 
   friend bool operator==(const SoundState&, const SoundState&) = default;

@@ -28,6 +28,7 @@ struct Plan {
   std::vector<std::string> items{"overall"};
   int lowest = 1, highest = 5;  ///< of the scale of each item
   std::uint64_t seed = 1;
+  bool simulated = false;  ///< sessions and ratings are by programs: the report says so on every page
 };
 struct Participant {
   std::string code, group;
@@ -81,7 +82,9 @@ std::size_t make_order(const std::filesystem::path& folder);
 
 /// By which a form and what it saves know their study.
 [[nodiscard]] std::string study_id(const Plan& plan);
-/// One page with everything in it. Sessions in an order of the rater's own, by blind codes only.
+/// Blind codes of all sessions, in the order in which this rater sees them; it follows from the study's seed and the rater's code.
+[[nodiscard]] std::vector<std::string> rating_order(const Study& study, const std::string& rater);
+/// One page with everything in it. Sessions in rating_order(), by blind codes only.
 [[nodiscard]] std::string form_html(const Study& study, const std::string& rater);
 /// What the form saved, checked against the study; `name` as errors call it. Tells in `notes` what is missing.
 [[nodiscard]] RaterSheet read_ratings(const std::string& text, const std::string& name, const Study& study,

@@ -21,4 +21,18 @@ struct StuffingOptions {
 /// Errors: as of DistanceMapper; failed when nothing is inside at that spacing.
 [[nodiscard]] TetMesh stuffed_tets(const TriangleSoup& surface, const StuffingOptions& options, const Context& context = {});
 
+/// What hangs together by a point or an edge alone comes apart there: each of its parts gets a point of its own. Afterwards the boundary is
+/// a manifold. Returns how many points were made. O(tets).
+std::uint64_t open_hinges(TetMesh& mesh);
+
+struct KeptThin {
+  TetMesh mesh;
+  double spacing_mm = 0;     ///< of the lattice that was taken
+  std::uint64_t hinges = 0;  ///< points made by open_hinges()
+};
+/// The same at a lattice as fine as thin parts ask: halved, at most `halvings` times and while it has fewer than 4e7 points, until the
+/// tetrahedra fill the surface's volume (`volume_mm3`) to `most_lost` (a share). Hinges are opened.
+[[nodiscard]] KeptThin stuffed_tets_keeping(const TriangleSoup& surface, const StuffingOptions& options, double volume_mm3,
+                                            double most_lost, int halvings, const Context& context = {});
+
 }  // namespace osteo

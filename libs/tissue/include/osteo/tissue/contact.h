@@ -38,6 +38,23 @@ class BallShape final : public RigidShape {
   bool triangles_;
 };
 
+/// All that lies behind a plane.
+class PlaneShape final : public RigidShape {
+ public:
+  /// `normal` points out of it, of any length above 0.
+  PlaneShape(Vec3 at_mm, Vec3 normal) : at_(at_mm), normal_(normalized(normal)) {}
+  [[nodiscard]] Ball bounds() const override { return {at_, 1e300}; }
+  double distance_mm(Vec3 at, Vec3& outwards) const override {
+    outwards = normal_;
+    return dot(at - at_, normal_);
+  }
+  [[nodiscard]] Vec3 at_mm() const { return at_; }
+  [[nodiscard]] Vec3 normal() const { return normal_; }
+
+ private:
+  Vec3 at_, normal_;
+};
+
 /// A closed surface by its distance map (exact at the map's points, linear between) over a box; outside the box it is not felt.
 class SurfaceShape final : public RigidShape {
  public:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "osteo/base/context.h"
+#include "osteo/tissue/contact.h"
 #include "osteo/tissue/energy.h"
 
 namespace osteo {
@@ -28,6 +29,18 @@ struct TissueLoad {
     Vec3 force_n;
   };
   std::vector<EdgeForce> edge_forces_n;
+  /// Points that are held along some axes at another place than at rest.
+  struct Moved {
+    std::uint32_t point = 0;
+    std::uint8_t held = 0;  ///< axes, as of Slider
+    Vec3 by_mm;             ///< along those
+  };
+  std::vector<Moved> moved;
+  /// Rigid things that points of the body's surface are pushed out of.
+  std::vector<RigidContact> contacts;
+  /// Spreads a force over a tetrahedron as a body force (gravity) acts: a quarter a corner; of quadratic ones a fifth in the middle of each
+  /// edge and less than nothing at the corners.
+  void add_in_tet(const std::array<std::uint32_t, 4>& corners, Vec3 force_n);
   /// Spreads a force evenly over a triangle.
   void add_on_face(const std::array<std::uint32_t, 3>& corners, Vec3 force_n);
 };
@@ -48,6 +61,10 @@ struct Equilibrium {
   double energy_mj = 0;       ///< internal
   std::uint64_t shifted = 0;  ///< factorisations that needed a shift: the energy was not convex there
 };
+
+/// Errors: usage, when a part of the body could still move as a rigid body, with that part's first point; elements of one point hold
+/// theirs.
+void require_held(const Energy& energy, std::span<const Vec3> rest, std::span<const std::uint32_t> fixed, std::span<const Slider> sliders);
 
 /// Newton's method with exact Hessians: where Cholesky fails the diagonal is shifted until it does not; steps are shortened until the
 /// energy falls (L. Armijo 1966). Each iteration's cost is a sparse factorisation (AMD order; from 1,500 rows on CHOLMOD's supernodal one

@@ -16,6 +16,10 @@ namespace osteo {
 ///   "fixed": [ {"box_mm": [[-1,-1,-1],[100,100,0.1]]}, {"box_mm": [[-1,-1,-1],[0.1,100,100]], "axes": "x"} ],
 ///   "loads": [ {"name": "pull", "forces": [ {"at_mm": [5,5,10], "radius_mm": 3, "total_n": [0,0,1]} ],
 ///                               "surfaces": [ {"box_mm": [[0,0,9.9],[10,10,10.1]], "kpa": 2} ]} ] }
+/// docs/tissue-problem.md has every key with its unit; a load may also have
+///   "volumes": [{place, "total_n": [0,0,1]}], "gravity_m_s2": [0,0,-9.81] (with "density_kg_m3" in the material),
+///   "moved": [{place, "by_mm": [0,0,-1], "axes": "z"}],
+///   "contacts": [{"at_mm": [0,0,0], "normal": [0,0,1] (or "radius_mm"), "stiffness_n_per_mm": 10}].
 /// Places are boxes ("box_mm") or balls ("at_mm", "radius_mm"), LPS. A force is the total over the points in its place, shared evenly.
 /// A surface is loaded where the middle of a triangle of the body's boundary lies in its place: "kpa", one number: a pressure inwards;
 /// three: force over area. Both are of the shape at rest. With "axes" points are held along those only, and slide along the others.
@@ -24,14 +28,15 @@ namespace osteo {
 /// kPa. A key that is not known is an error.
 ///
 /// Or an input file of Abaqus or CalculiX, with mm, N and MPa, whose mesh `mesh` is (load_tets): *ELASTIC or *HYPERELASTIC, NEO HOOKE by
-/// *SOLID SECTION; *BOUNDARY without movement; each *STEP a load of *CLOAD and *DLOAD (P1 to P4), NLGEOM says which law.
+/// *SOLID SECTION; *BOUNDARY, within a *STEP with movements too; each *STEP a load of *CLOAD and *DLOAD (P1 to P4; GRAV, with *DENSITY),
+/// NLGEOM says which law.
 struct TissueProblem {
   Material general;                  ///< of what no region has
   std::vector<Material> materials;   ///< one a tetrahedron, or one for all
   std::vector<std::uint32_t> fixed;  ///< points
   std::vector<Slider> sliders;
   std::vector<std::string> load_names;
-  std::vector<TissueLoad> loads;  ///< each with `fixed` and `sliders`
+  std::vector<TissueLoad> loads;  ///< each with `fixed` and `sliders`, and what it holds or moves besides
   std::optional<ElasticLaw> law;  ///< what an .inp says; JSON leaves it open
   std::optional<TetOrder> order;
 };

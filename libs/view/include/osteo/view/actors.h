@@ -11,7 +11,6 @@
 class vtkActor;
 class vtkMatrix4x4;
 class vtkPolyData;
-class vtkProperty;
 class vtkRenderer;
 
 namespace osteo {
@@ -20,8 +19,15 @@ namespace osteo {
 inline constexpr double kBoneAmbient = 0.16;
 /// Dry bone under soft light. The data may be replaced later through the actor's mapper.
 [[nodiscard]] vtkSmartPointer<vtkActor> make_bone_actor(vtkPolyData* data);
-/// 0: dry and dull, 1: wet, a little darker and with highlights.
-void set_bone_wetness(vtkProperty* bone, double share);
+/// Wet: the fourth component of its colours says how dry a point is (255: dry); wet bone is darker, and mirrors the lamp. It stays opaque.
+void set_bone_wet(vtkActor* bone, bool wet);
+/// For what one sees through: drawn when all else is, in the order in which they are added, blended over it.
+enum class Late {
+  nearest,     ///< where nothing is in front; of itself, and of what is added later, only what is in front shows: water, which comes first
+  all,         ///< where nothing is in front; all of it, in any order
+  through_all  ///< whatever is in front
+};
+[[nodiscard]] vtkSmartPointer<vtkActor> make_late_actor(Late how);
 /// The surface of a round cone, its axis along +z; with normals.
 [[nodiscard]] vtkSmartPointer<vtkPolyData> round_cone_surface(const RoundCone& shape);
 void set_matrix(vtkMatrix4x4* matrix, const RigidTransform& transform);

@@ -28,7 +28,11 @@ class BonePaint {
   /// `structures`, which must outlive this, and `hardness` may be null. The bone is only read here.
   BonePaint(const BrickGrid& bone, const StructureMap* structures, std::shared_ptr<const Hardness> hardness);
   /// Voxels of these bricks have changed.
-  void renew(const BrickGrid& bone, std::span<const std::uint32_t> bricks) { openness_.renew(bone, bricks); }
+  void renew(const BrickGrid& bone, std::span<const std::uint32_t> bricks) { openness_->renew(bone, bricks); }
+  /// How deep places of this bone lie; it changes with renew().
+  [[nodiscard]] std::shared_ptr<const Openness> openness() const { return openness_; }
+  /// Bone of the same world that shades this too: a finer region and what is around it.
+  void shade_with(std::vector<std::shared_ptr<const Openness>> others) { others_ = std::move(others); }
   /// One for each vertex of a patch. About 0.5 us each, near structures 1.
   void paint(const BrickGrid& bone, const SurfacePatch& patch, std::vector<Rgb>& colours) const;
 
@@ -36,7 +40,8 @@ class BonePaint {
   [[nodiscard]] double density_below(const BrickGrid& bone, Vec3 index, Vec3 outwards_index) const;
   const StructureMap* structures_;
   std::shared_ptr<const Hardness> hardness_;
-  Openness openness_;
+  std::shared_ptr<Openness> openness_;
+  std::vector<std::shared_ptr<const Openness>> others_;
 };
 
 /// How much of a structure's colour comes through the bone above it, 0 to 1, along the way `inwards` from a point of the surface, and

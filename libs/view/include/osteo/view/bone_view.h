@@ -1,8 +1,10 @@
 // The live bone in a VTK renderer: chunks of bricks, each an actor, so that an edit uploads little.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <vtkSmartPointer.h>
@@ -10,6 +12,7 @@
 #include "osteo/bone/live_surface.h"
 #include "osteo/bone/rigid_transform.h"
 #include "osteo/view/bone_paint.h"
+#include "osteo/view/wet_film.h"
 
 class vtkActor;
 class vtkFloatArray;
@@ -33,13 +36,23 @@ class BoneView {
   void show(const LiveSurface& surface);
   /// Renews the chunks that hold these bricks. Farther bone, which may get more light now, keeps its colours until refresh().
   void update(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
-  /// Colours as if shown anew. 0.3 us for each vertex within Openness::kReachMm of what was updated since.
+  /// Colours as if shown anew. 0.3 us for each vertex within Openness::kReachMm of what was updated since, here or in bone that shades it.
   void refresh(const LiveSurface& surface);
+  /// Views of bone that always moves with this one and stands in its light, as this in theirs: a finer region and what is around it. They
+  /// must outlive this, or another call. refresh() of each must be called, in any order, when all have their updates.
+  void shade_with(const std::vector<BoneView*>& others);
   /// Where the bone is now.
   void place(const RigidTransform& world_from_body);
   void highlight(bool on);
-  /// 0: dry and dull, 1: wet, darker and with highlights. Nothing is made again.
-  void set_wetness(double share);
+  /// Where there is water on it, which must outlive this (null: nowhere). Bricks that change are wet at once.
+  void set_film(const WetFilm* film) { film_ = film; }
+  /// Wet bone is darker and mirrors the lamp: looks again at bricks near which the film's last update changed something, or at all of them
+  /// where this has been moved since. Of chunks that look otherwise, the colours are made again. 0.2 us a vertex.
+  void wet(const LiveSurface& surface);
+
+  /// Bone that drilling has warmed is seen from 42 C on, amber, from 57 C on red, in steps of a kelvin. Looks at bricks that touch one of
+  /// `near` (centre, radius in mm) and at those that glowed. 0.3 us a vertex of these.
+  void warm(const LiveSurface& surface, std::span<const std::pair<Vec3, double>> near, const std::function<double(Vec3)>& celsius_at);
 
   /// A chunk's triangles as they were at some version; they stay when the chunk is made again.
   struct Arrays {
@@ -76,9 +89,13 @@ class BoneView {
     std::uint64_t coarse_version = 0;
     Drawn drawn = Drawn::complete;
     std::size_t drawn_triangles = 0;
+    bool wet = false;
   };
   void rebuild(Chunk& chunk, const LiveSurface& surface);
   void recolour(Chunk& chunk);
+  void set_colours(Chunk& chunk);
+  bool wet_brick(const LiveSurface& surface, std::uint32_t brick);
+  bool warm_brick(const LiveSurface& surface, std::uint32_t brick, const std::function<double(Vec3)>& celsius_at);
   void paint(const LiveSurface& surface, std::span<const std::uint32_t> bricks);
   static void draw(Chunk& chunk, vtkTypeInt32Array* triangles, Drawn drawn);
 
@@ -86,12 +103,18 @@ class BoneView {
   const StructureMap* structures_;
   std::shared_ptr<const Hardness> hardness_;
   std::unique_ptr<BonePaint> paint_;
-  std::vector<std::vector<Rgb>> colours_;  // of each brick's vertices
-  RigidTransform placed_;
+  std::vector<std::vector<Rgb>> colours_;        // of each brick's vertices
+  std::vector<std::vector<std::uint8_t>> wet_;   // 255: all wet; empty: dry
+  std::vector<std::vector<std::uint8_t>> warm_;  // kelvin above where it is seen; empty: nowhere
+  const WetFilm* film_ = nullptr;
+  RigidTransform placed_, wetted_at_;
   vtkSmartPointer<vtkMatrix4x4> matrix_;  // null: it has not moved
   std::vector<Chunk> chunks_;
   std::vector<std::uint32_t> chunk_of_brick_, updated_;  // updated since the last refresh
   std::vector<bool> is_updated_;
+  std::vector<BoneView*> others_;
+  std::vector<Vec3> updated_beside_mm_;  // middles of bricks of those, since the last refresh
+  bool all_updated_ = false;
   std::uint64_t version_ = 0;
   double voxel_mm_ = 1;
 };

@@ -41,6 +41,8 @@ class InstrumentView {
   /// `rate_hz`: ticks a second. Cost: 5 us; where the shaft touches or a burr comes up to speed some 0.2 ms.
   void show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid = {});
   void hide();
+  /// The handle in a colour of its own (red, green, blue, 0 to 1), which tells whose it is; `opacity` below 1: of one that is not there.
+  void tell_apart(Vec3 colour, double opacity);
   /// How much of the shaft is within bone: 0 to 1, of its rings; as of the last picture.
   [[nodiscard]] double shaft_in_bone() const;
   [[nodiscard]] bool ghost_shown() const;

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -22,8 +23,10 @@ class Openness {
   explicit Openness(const BrickGrid& bone, int threads = 0);
   /// Voxels of these bricks have changed. About 1 us a brick and 512 voxels.
   void renew(const BrickGrid& bone, std::span<const std::uint32_t> bricks);
-  /// At a point of the surface in voxel indices, with its unit normal out of the bone along the index axes. 0.3 us.
-  [[nodiscard]] double at(const std::array<float, 3>& index, const std::array<float, 3>& normal) const;
+  /// At a point of the surface in voxel indices, with its unit normal out of the bone along the index axes. 0.3 us. Other bone of the same
+  /// world stands in the light too: where it is within reach, as long again for each.
+  [[nodiscard]] double at(const std::array<float, 3>& index, const std::array<float, 3>& normal,
+                          std::span<const std::shared_ptr<const Openness>> others = {}) const;
 
  private:
   struct Level {
@@ -31,10 +34,13 @@ class Openness {
     std::vector<std::uint8_t> cells;  // mean density in 255ths
     double edge_voxels = 1;
   };
+  [[nodiscard]] bool reaches(Vec3 world_mm) const;
   [[nodiscard]] static double sample(const Level& level, Vec3 index);
   void sum_brick(const BrickGrid& bone, std::uint32_t brick);
   void sum_above(std::size_t level, std::array<int, 3> lo, std::array<int, 3> hi);
-  int edge_;  // voxels along an edge of the finest cells
+  Frame frame_;
+  std::array<Vec3, 2> box_;  // of all its bricks, in voxels
+  int edge_;                 // voxels along an edge of the finest cells
   std::array<Level, 3> levels_;
 };
 

@@ -24,14 +24,14 @@ class WorldView {
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
+  /// What is done in an update: what can wait a quarter of a second waits, by the clock; or all, so that a picture follows from the scene.
+  enum class Work { urgent, all };
   /// Shows the scene as it is; after the first time only what changed is made again.
-  void update(const World& world, SceneReaders& readers);
+  void update(const World& world, SceneReaders& readers, Work work = Work::urgent);
   /// Soft tissue as it is now; under the lock that keeps it still.
   void update_soft(SoftBody& soft);
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
-  /// Of all bone; see BoneView::set_wetness.
-  void set_wetness(double share);
   [[nodiscard]] std::size_t triangles() const;
   /// Before each frame of a window: while the camera rests, a thread finds what can be seen, and only that is drawn until camera or pieces
   /// move. Bone that changes meanwhile is drawn whole. With `coarse`, while the camera moves a quarter of the triangles stand for the bone,
@@ -51,6 +51,9 @@ class WorldView {
     std::vector<std::uint32_t> triangles;
     double error_mm;
   };
+  void shade_regions(const World& world, const SceneReaders& readers);
+  bool look_at_film(const SceneReaders& readers, std::chrono::steady_clock::time_point now);
+  bool look_at_heat(const SceneReaders& readers, std::chrono::steady_clock::time_point now);
   void wake(bool coarse);
   void make_coarse();
   void take_coarse();
@@ -59,6 +62,7 @@ class WorldView {
   vtkSmartPointer<vtkActor> soft_actor_;
   vtkSmartPointer<vtkPolyData> soft_data_;
   std::uint64_t soft_version_ = 0;
+  WetFilm film_;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
   PlateView plates_;
   std::unique_ptr<DustView> dust_;
@@ -68,7 +72,10 @@ class WorldView {
   std::future<std::vector<Seen>> coarsening_;
   std::atomic<bool> stop_ = false;
   std::chrono::steady_clock::time_point settle_at_, changed_at_;
-  double wetness_ = 0;
+  std::chrono::steady_clock::time_point film_at_{};  // when it is looked at again
+  std::uint64_t film_of_ = 0;                        // version of the dust
+  std::vector<std::pair<Vec3, double>> warm_places_;
+  std::chrono::steady_clock::time_point heat_at_{};  // when it is looked at again
   bool looked_ = false;
   std::uint64_t looked_version_ = 0, coarse_version_ = 0;
 };

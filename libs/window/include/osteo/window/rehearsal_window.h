@@ -12,12 +12,18 @@
 #include "osteo/data/volume.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/view/planned_regions.h"
 #include "osteo/view/quality.h"
+#include "osteo/window/monitor_desk.h"
 #include "osteo/window/person_settings.h"
+#include "osteo/window/session_review.h"
 #include "osteo/window/sound_out.h"
+#include "osteo/window/tutor_now.h"
 #include "osteo/window/window_shell.h"
 
 namespace osteo {
+
+struct HandTuning;
 
 struct WindowOptions {
   Quality quality = Quality::automatic;
@@ -29,7 +35,10 @@ struct WindowOptions {
   bool approval_ended = false;   ///< by a later change: said in another colour
   std::vector<SparseGrid> bone;  ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
   std::optional<Image> ct;       ///< the scan of the case, for its cuts; none: they show what the case keeps of it
+  std::vector<PlannedRegion> regions;  ///< of a procedure, to be outlined; those of structures that the case lacks are told
+  std::vector<Vec3> way;               ///< of a recorded hand that leads; drawn; empty: none does
   StereoParams stereo;
+  bool review_only = false;          ///< a session that is over is shown: the page at the end, and nothing that begins another
   bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
   std::string case_hash;             ///< of the manifest: names the case in captions, without its folder
   bool end_page = true;              ///< what was done is shown when the person ends the session; false: the window closes
@@ -42,6 +51,7 @@ struct SessionFacts {
     std::string name;
     double least_clearance_mm = 0, touched_s = 0, injured_s = 0;
   };
+  bool past = false;  ///< it was over before the window opened, and is only looked at
   std::filesystem::path folder;
   double seconds = 0, rate_hz = 1000, removed_mm3 = 0, sawn_mm3 = 0, tissue_mm3 = 0;
   std::size_t bodies = 1;
@@ -61,7 +71,6 @@ struct HandView {
 
 /// Hardware for the camera, as it is now. Lengths, pushes and turns in the device's own right, up and towards the user.
 struct CameraDevices {
-  bool pedal = false;             ///< its brake is released, as by the key
   std::optional<Vec3> hand_mm;    ///< of an arm whose hand is lent to the camera
   std::optional<Vec3> hand_axis;  ///< its handle
   std::optional<Vec3> push;       ///< deflection of a puck that is not the drill now, 0 to 1
@@ -76,6 +85,8 @@ struct WindowActions {
   std::function<HandGoal(bool from_case, const HandView& view)> begin;
   /// The rehearsal that runs now; null where none does.
   std::function<Rehearsal*()> rehearsal;
+  /// Notes of the session that the first one goes on from, asked for once when that has begun; none: it goes on from none.
+  std::function<std::vector<Note>()> notes_before;
   /// Folder for screenshots of the session that runs now, or ran last.
   std::function<std::filesystem::path()> folder;
   /// Why the session that runs has to end now (its recording has): the window saves it and says so.
@@ -83,14 +94,26 @@ struct WindowActions {
   /// Each frame: what hardware says to the camera. `lend`: the drill's hand is to rest where it is, its device moves the camera. May be
   /// empty.
   std::function<CameraDevices(bool lend)> camera;
-  /// The pedal of a hand that moves by itself but has none of its own, by the window's keys and buttons; may be empty.
-  std::function<void(bool drill)> press;
+  /// Each frame, of a hand that moves by itself: how it works on its tool, and what keys and buttons of the window press. May be empty.
+  std::function<void(const HandTuning&)> tune;
+  /// Each frame: switches of a foot pedal that are down, as bits; nothing: there is no pedal. `attended`: the window has the keys; while it
+  /// has not, no switch is to press anything, and after that not before it has come up. May be empty.
+  std::function<std::optional<std::uint32_t>(bool attended)> switches;
   /// Asked before each picture: whether the window is to close.
   std::function<bool()> stop;
   /// Of the session that was saved last.
   std::function<SessionFacts()> facts = {};
   /// The scene as the session that runs began with it; may take seconds, and is called in another thread. Empty: cannot be told.
   std::function<World(const Context&)> world_at_begin = {};
+  /// Of the session that was saved last: what there is to say of it. May take seconds, and is called in another thread, in which no session
+  /// is begun meanwhile. Empty: nothing is shown.
+  std::function<SessionReview(const Context&)> review = {};
+  /// The nerve monitor of the rehearsal that runs; null: it has none. Empty: there never is one.
+  std::function<MonitorDesk*()> monitor = {};
+  /// Who leads the hand, and who takes part from elsewhere. Empty: nobody ever does.
+  std::function<TutorNow()> tutor = {};
+  /// The hand is to be led, or let go; softly. Empty: nobody leads it.
+  std::function<void(bool)> lead = {};
 };
 
 /// How a rehearsal was left.

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "osteo/scene/monitor_sound.h"
 #include "osteo/scene/rehearsal.h"
 
 namespace osteo {
@@ -18,6 +19,8 @@ class SoundOut {
 
   /// Leaves the rehearsal it followed; null: follows none. Called before a rehearsal ends.
   void follow(Rehearsal* rehearsal);
+  /// Beside it, while sound is on, a nerve monitor; null: none. It must live until it is exchanged.
+  void mix_in(MonitorSound* monitor);
 
   [[nodiscard]] bool on() const { return on_; }
   [[nodiscard]] double volume() const { return volume_; }
@@ -37,6 +40,7 @@ class SoundOut {
   double volume_;
   bool alarms_;
   Rehearsal* rehearsal_ = nullptr;
+  MonitorSound* monitor_ = nullptr;
   std::string failure_;
   std::unique_ptr<Playing> playing_;
 };

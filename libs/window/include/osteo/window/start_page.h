@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "osteo/window/person_settings.h"
 #include "osteo/window/window_shell.h"
@@ -24,6 +25,8 @@ struct StartOptions {
 
 /// What a path that was dropped stands for: a case, a session or a file that one is known by; else nothing, and `why` says what to do.
 [[nodiscard]] std::optional<StartChoice> choice_of(const std::filesystem::path& path, std::string& why);
+/// The same for several dropped at once: the first that is one counts; `why` is about the first.
+[[nodiscard]] std::optional<StartChoice> choice_of(const std::vector<std::filesystem::path>& paths, std::string& why);
 
 /// Runs until something is chosen; nothing: the person closes the window. Cases opened last come from `person`, whose choices on the page
 /// are changed there.

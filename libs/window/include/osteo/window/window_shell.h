@@ -31,8 +31,13 @@ class WindowShell {
 
   [[nodiscard]] GLFWwindow* window() const { return window_; }
   void set_title(const std::string& title);
-  /// Keys as GLFW numbers them; released 0, pressed 1, repeated 2; `shift` was down with it. Ctrl with + and - is the shell's.
-  std::function<void(int key, int action, bool shift)> on_key;
+  /// Keys as GLFW numbers them; released 0, pressed 1, repeated 2; shift 1, Ctrl 2, Alt 4 were down with it. Ctrl with + and - is the
+  /// shell's.
+  std::function<void(int key, int action, int modifiers)> on_key;
+  /// The window has the keys; before it has ever had them, too.
+  [[nodiscard]] bool attended() const { return attended_; }
+  /// The mouse's right and left button change places, for all of the window.
+  bool mirror_mouse = false;
   /// Files and folders that were dropped onto the window since the last call.
   [[nodiscard]] std::vector<std::filesystem::path> take_dropped();
 
@@ -65,7 +70,7 @@ class WindowShell {
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0, em_ = 0;
   double told_scale_ = 1, fixed_scale_, by_hand_;
-  bool full_screen_ = false;
+  bool full_screen_ = false, attended_ = true;
   int windowed_[4] = {0, 0, 0, 0};
   int gl_errors_ = 0;
   std::vector<std::filesystem::path> dropped_;

@@ -1,0 +1,122 @@
+// The verbs that speak to a PACS.
+#pragma once
+#include <string>
+
+#include "osteo/cli/command.h"
+#include "osteo/pacs/peer.h"
+
+namespace osteo {
+
+struct TlsFlags {
+  std::string tls_ca, tls_certificate, tls_key;
+  static void describe(TlsFlags& p, auto& visit) {
+    visit({"tls_ca", "speak TLS, and trust certificates that these have signed (PEM; empty: nothing is encrypted)"}, p.tls_ca);
+    visit({"tls_certificate", "our own certificate (PEM)"}, p.tls_certificate);
+    visit({"tls_key", "its key, in a file that only we may read (PEM, without a password)"}, p.tls_key);
+  }
+  [[nodiscard]] DicomTls tls() const { return {tls_ca, tls_certificate, tls_key}; }
+};
+
+/// Which node, and as whom.
+struct PeerFlags : TlsFlags {
+  std::string peer, ae = "OSTEOTOME";
+  double timeout_s = 30;
+  static void describe(PeerFlags& p, auto& visit) {
+    visit({"peer", "the node, as TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242"}, p.peer);
+    visit({"ae", "our own title, which the node must know"}, p.ae);
+    visit({"timeout_s", "for the connection and for each answer", "s", 1, 3600}, p.timeout_s);
+    TlsFlags::describe(p, visit);
+  }
+};
+
+struct SendCommand {
+  struct Params : PeerFlags {
+    bool dry_run = false;
+    bool check = true;
+  };
+  static void describe(Params& p, auto& visit) {
+    PeerFlags::describe(p, visit);
+    visit({"dry_run", "say what would leave, and speak to nobody"}, p.dry_run);
+    visit({"check", "ask afterwards which of the objects the node has (--no-check: believe its answers)"}, p.check);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct FetchCommand {
+  struct Params : PeerFlags {
+    std::string out, study, series, accession, patient_id, date, modality;
+    double series_gb = 16;
+  };
+  static void describe(Params& p, auto& visit) {
+    PeerFlags::describe(p, visit);
+    visit({"out", "folder for the series (empty: only list what there is; also -o)"}, p.out);
+    visit({"study", "UID of a study"}, p.study);
+    visit({"series", "UID of a series, or its number as listed"}, p.series);
+    visit({"accession", "number of a request"}, p.accession);
+    visit({"patient_id", "others on this machine can see what a command is called with"}, p.patient_id);
+    visit({"date", "of the study, like 20240131 or 20240101-20240131"}, p.date);
+    visit({"modality", "like CT (empty: any)"}, p.modality);
+    visit({"series_gb", "a series may not be larger", "GB", 0.000001, 1000}, p.series_gb);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct ReceiveCommand {
+  struct Params : TlsFlags {
+    std::string ae = "OSTEOTOME", bind = "127.0.0.1", allow, metrics;
+    int port = 11112;
+    bool anybody = false;
+    int associations = 20;
+    double object_gb = 2, folder_gb = 100, keep_free_gb = 1, memory_mb = 256, timeout_s = 30, association_s = 3600, quiet_s = 30;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"ae", "our title: who calls another is refused"}, p.ae);
+    visit({"bind", "IPv4 address to listen on (0.0.0.0: every network this machine is in)"}, p.bind);
+    visit({"port", "to listen on (0: any free one)", "", 0, 65535}, p.port);
+    visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
+    visit({"anybody", "let every node send"}, p.anybody);
+    visit({"associations", "at once; more are refused", "", 1, 1000}, p.associations);
+    visit({"object_gb", "a larger object is refused", "GB", 0.000001, 100}, p.object_gb);
+    visit({"folder_gb", "all of the folder; what would be beyond is refused", "GB", 0.000001, 1e6}, p.folder_gb);
+    visit({"keep_free_gb", "of the disk; below it everything is refused", "GB", 0, 1e6}, p.keep_free_gb);
+    visit({"memory_mb", "that an association may make its process take", "MB", 16, 100000}, p.memory_mb);
+    visit({"timeout_s", "for each message of a node", "s", 1, 3600}, p.timeout_s);
+    visit({"association_s", "longest that a node may stay", "s", 1, 86400}, p.association_s);
+    visit({"quiet_s", "a series is closed when nothing of it came for so long", "s", 0.1, 86400}, p.quiet_s);
+    visit({"metrics", "file for counters, in Prometheus' text form (empty: none)"}, p.metrics);
+    TlsFlags::describe(p, visit);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+struct WatchCommand {
+  struct Params {
+    std::string rules, out, metrics;
+    double quiet_s = 30, poll_s = 2;
+    int jobs = 1;
+    double memory_mb = 4000, minutes = 60, keep_free_mb = 500;
+    int retries = 1;
+    bool once = false, no_report = false;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"rules", "file that says which series go through which pipeline, like pipelines/rules.json"}, p.rules);
+    visit({"out", "folder for cases and journal, made when it is not there (also -o)"}, p.out);
+    visit({"quiet_s", "a series is taken when none of its files has come or changed for so long", "s", 0.1, 86400}, p.quiet_s);
+    visit({"poll_s", "between looks into the folder", "s", 0.1, 3600}, p.poll_s);
+    visit({"jobs", "cases at a time", "", 1, 1024}, p.jobs);
+    visit({"memory_mb", "memory that a case may have; one that needs more is ended (0: no bound)", "MB", 0, 10000000}, p.memory_mb);
+    visit({"minutes", "time that a case may take; one that needs longer is ended (0: no bound)", "min", 0, 100000}, p.minutes);
+    visit({"retries", "further tries of a case that ended for memory, time or a signal", "", 0, 100}, p.retries);
+    visit({"keep_free_mb", "begin no case with less free on the disk of the cases", "MB", 0, 1e9}, p.keep_free_mb);
+    visit({"once", "end when all that is there is done, instead of waiting for more"}, p.once);
+    visit({"no_report", "write no report of each case: its cuts are pictures of the patient"}, p.no_report);
+    visit({"metrics", "file for counters, in Prometheus' text form (empty: none)"}, p.metrics);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+}  // namespace osteo

@@ -1,0 +1,94 @@
+// watch: scans that come into a folder become cases, by rules.
+#include "osteo/pacs/watch.h"
+
+#include <algorithm>
+#include <ostream>
+
+#include "batch_command.h"
+#include "osteo/base/json_document.h"
+#include "osteo/pipeline/pipeline.h"
+#include "pacs_commands.h"
+#include "temporal_bone_pipeline.h"
+
+namespace osteo {
+namespace {
+
+// All that can be known to go wrong is told before anything is begun.
+void check_rule(const SeriesRule& rule) {
+  if (rule.ignore) return;
+  const std::string text = rule.pipeline.empty() ? std::string(kTemporalBonePipeline) : read_text(rule.pipeline);
+  PrepareCommand::Params prepare;
+  std::vector<std::string> known;
+  for (const FieldRef& f : case_fields(prepare)) known.emplace_back(f.doc.name);
+  for (const PipelineVariable& v : pipeline_variables(text)) known.push_back(v.name);
+  for (const auto& [name, value] : rule.set) {
+    if (name.find('.') != std::string::npos || std::ranges::find(known, name) != known.end()) continue;
+    const std::string near = nearest_name(name, known);
+    throw Error(ExitCode::usage, "rule '" + rule.name + "' sets " + name + ": that is no setting of a case",
+                near.empty() ? "'osteo help prepare' shows them" : "did you mean '" + near + "'?");
+  }
+}
+
+}  // namespace
+
+cli::CommandInfo WatchCommand::info() {
+  return {
+      "watch",
+      "scans that come into a folder become cases, by rules",
+      "Looks into FOLDER (that of 'osteo receive', or any other) and below it. When none of a series' files has come or changed for "
+      "--quiet-s, the first rule that matches it decides: its pipeline is run by 'osteo prepare' in a process of its own, with bounds on "
+      "memory and time. What was done is in OUT/records, by the objects it was done with, so that the same line started again, also after "
+      "a "
+      "power cut, goes on where it was, and the same objects never run twice. Slices that come late run their series again, into "
+      "OUT/cases/CODE-2: no case is ever replaced. Objects made by this program, and what is no CT or MR image, never run. CODE is a hash; "
+      "no name is in records or on standard output. A case that was refused or failed is tried again when more of its series comes.",
+      {{"folder", "where scans come in; nothing in it is changed"}},
+      "osteo watch INBOX --rules pipelines/rules.json -o CASES"};
+}
+
+int WatchCommand::run(const Params& p, cli::Invocation& io) {
+  if (p.rules.empty()) throw Error(ExitCode::usage, "by which rules?", "--rules FILE; pipelines/rules.json is one to begin with");
+  if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo watch " + io.arguments[0] + " -o CASES");
+  const std::vector<SeriesRule> rules = read_series_rules(read_text(p.rules), p.rules);
+  for (const SeriesRule& rule : rules) check_rule(rule);
+  WatchOptions o;
+  o.folder = fs::absolute(io.arguments[0]);
+  o.out = fs::absolute(p.out);
+  o.quiet_s = p.quiet_s;
+  o.poll_s = p.poll_s;
+  o.jobs = p.jobs;
+  o.memory_mb = p.memory_mb;
+  o.seconds = p.minutes * 60;
+  o.retries = p.retries;
+  o.keep_free_mb = p.keep_free_mb;
+  o.once = p.once;
+  o.program = std::string(program_version());
+  io.end_progress();
+  const WatchWork work = [&](const SeriesRule& rule, const fs::path& source, const fs::path& folder) {
+    std::vector<std::string> a{"osteo",   "prepare", source.string(), "-o",     folder.string(),
+                               "--quiet", "--json",  "--fresh",       "--seed", std::to_string(io.common.seed)};
+    if (io.common.threads > 0) a.insert(a.end(), {"--threads", std::to_string(io.common.threads)});
+    if (!rule.pipeline.empty()) a.insert(a.end(), {"--pipeline", rule.pipeline.string()});
+    if (p.no_report) a.emplace_back("--no-report");
+    return make_case(std::move(a), rule.set, folder);
+  };
+  const auto tell = [&](const WatchEvent& e, const WatchCounters& c) {
+    if (io.common.json)
+      io.out << Json{{"series", e.series},        {"what", e.what},      {"rule", e.rule}, {"why", e.why},
+                     {"case", e.folder.string()}, {"objects", e.objects}}
+                    .dump()
+             << std::endl;
+    else if (e.what == "done")
+      io.out << e.folder.string() << std::endl;
+    if (!io.common.quiet || e.what == "unreadable" || e.what == "refused" || e.what == "failed" || e.what == "resources")
+      io.err << (e.series.empty() ? "" : e.series + ": ") << e.what << (e.rule.empty() ? "" : " by rule '" + e.rule + "'")
+             << (e.why.empty() ? "" : ": " + e.why) << std::endl;
+    if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
+  };
+  const WatchCounters c = watch_folder(rules, o, work, tell, io.context);
+  if (!p.metrics.empty()) write_file(p.metrics, metrics_text(c));
+  if (!io.common.quiet) io.err << c.done << " cases made, " << c.bad << " not, " << c.unmatched << " series without a rule\n";
+  return static_cast<int>(p.once && c.bad > 0 ? ExitCode::partial : ExitCode::ok);
+}
+
+}  // namespace osteo

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Makes the Debian packages: osteo, osteo-rehearse and libosteo-dev without copyleft options, osteo-full with them.
+# usage: apps/packaging/debs.sh OUT [--free-only]      builds in build/deb-free and build/deb-full
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+out=${1:?usage: apps/packaging/debs.sh OUT [--free-only]}
+mkdir -p "$out"
+out=$(cd "$out" && pwd)
+: "${SOURCE_DATE_EPOCH:=$(git -c safe.directory='*' -C "$root" log -1 --format=%ct 2>/dev/null || echo 1767225600)}"
+export SOURCE_DATE_EPOCH
+# No path of the tree in what is packed: the same bytes wherever it is built.
+: "${OSTEO_PACKAGER:=Osteotome developers <osteotome@example.org>}" # who gives packages away sets this
+flags="-ffile-prefix-map=$root=."
+make() { # FOLDER cmake-options...
+  local build=$root/build/$1
+  shift
+  cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr "-DOSTEO_PACKAGER=$OSTEO_PACKAGER" -DCMAKE_SKIP_RPATH=ON -DOSTEO_TESTS=OFF -DCMAKE_CXX_FLAGS="$flags" "$@" >"$build.configure.log" ||
+    { tail -20 "$build.configure.log" >&2; exit 1; }
+  cmake --build "$build"
+  (cd "$build" && rm -f ./*.deb && cpack -G DEB >"$build.pack.log" 2>&1) || { tail -20 "$build.pack.log" >&2; exit 1; }
+  cp "$build"/*.deb "$out"
+}
+mkdir -p "$root/build"
+make deb-free -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF -DOSTEO_MOVIE=OFF
+[ "${2:-}" = --free-only ] || make deb-full -DOSTEO_WINDOW=OFF
+ls -l "$out"/*.deb

@@ -1,0 +1,100 @@
+"""Stages of Osteotome as functions on numpy arrays. Each function, its signature and its help are made from the stage's declaration.
+
+    import osteo
+    ct, labels = osteo.phantom(region="temporal", spacing_mm=1.0)
+    bone = osteo.threshold(ct, lower=500)
+"""
+import inspect as _inspect
+import keyword as _keyword
+import warnings as _warnings
+from collections import namedtuple as _namedtuple
+
+from . import _osteo
+from ._osteo import Error, Grid, Image, Labels, Surface, Tets
+
+_types = {"source": "os.PathLike | str", "image": "Image", "labels": "Labels", "grid": "Grid", "surface": "Surface", "tets": "Tets",
+          "picture": "numpy.ndarray", "document": "dict"}
+_params = {"flag": "bool", "int": "int", "number": "float", "text": "str", "triple": "Sequence[float]", "list": "Sequence[int]", "choice": "str"}
+
+
+def _identifier(name):
+    name = name.replace("-", "_").replace(" ", "_")
+    return name + "_" if _keyword.iskeyword(name) else name
+
+
+def _input_type(port):
+    text = " | ".join(dict.fromkeys([_types[k] for k in port["kinds"]] + [_types["source"]]))
+    return text + " | None" if port["optional"] else text
+
+
+def _output_type(port):
+    return _types[port["kinds"][0]] + (" | None" if port["optional"] else "")
+
+
+def _signature(stage):
+    P = _inspect.Parameter
+    ports = [P(_identifier(p["name"]), P.POSITIONAL_OR_KEYWORD, default=None if p["optional"] else P.empty, annotation=_input_type(p))
+             for p in stage["inputs"]]
+    taken = {p.name for p in ports} | {"threads", "seed", "report"}
+    # A port and a parameter of one name: the parameter gets an underscore.
+    names = {}
+    for f in stage["fields"]:
+        name = _identifier(f["name"])
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        names[name] = f
+    fields = [P(name, P.KEYWORD_ONLY, default=f["default"], annotation=_params[f["kind"]]) for name, f in names.items()]
+    common = [P("threads", P.KEYWORD_ONLY, default=0, annotation="int"), P("seed", P.KEYWORD_ONLY, default=1, annotation="int"),
+              P("report", P.KEYWORD_ONLY, default=None, annotation="dict | None")]
+    outputs = [_output_type(p) for p in stage["outputs"]]
+    returns = outputs[0] if len(outputs) == 1 else f"tuple[{', '.join(outputs)}]"
+    return _inspect.Signature(ports + fields + common, return_annotation=returns), {n: f["name"] for n, f in names.items()}
+
+
+def _help(stage, fields):
+    lines = [stage["synopsis"], "", stage["description"], ""]
+    lines += [f"{_identifier(p['name'])}: {p['help']}" for p in stage["inputs"]]
+    by_name = {f["name"]: f for f in stage["fields"]}
+    for name, original in fields.items():
+        f = by_name[original]
+        limits = f" ({f['lo']:g} to {f['hi']:g})" if abs(f["lo"]) != float("inf") and abs(f["hi"]) != float("inf") else ""
+        unit = f" [{f['unit']}]" if f["unit"] else ""
+        choices = f" (one of {', '.join(f['choices'])})" if f["choices"] else ""
+        lines.append(f"{name}: {f['help']}{unit}{limits}{choices}")
+    lines += ["threads: 0 takes all cores; the result never depends on it", "seed: for every random choice",
+              "report: a dict that is filled with what the stage measured", ""]
+    lines += [f"Returns {_identifier(p['name'])}: {p['help']}" for p in stage["outputs"]]
+    return "\n".join(lines)
+
+
+def _function(stage):
+    signature, fields = _signature(stage)
+    name = stage["name"]
+    ports = [_identifier(p["name"]) for p in stage["inputs"]]
+    outputs = [_identifier(p["name"]) for p in stage["outputs"]]
+    result = _namedtuple(_identifier(name) + "_result", outputs, rename=True) if len(outputs) > 1 else None
+
+    def function(*args, **kwargs):
+        given = signature.bind(*args, **kwargs).arguments
+        params = {fields[k]: v for k, v in given.items() if k in fields}
+        values, measured, warned = _osteo.run(name, [given.get(p) for p in ports], params, given.get("threads", 0), given.get("seed", 1))
+        for text in warned:
+            _warnings.warn(text, stacklevel=2)
+        if given.get("report") is not None:
+            given["report"].update(measured)
+        return values[0] if result is None else result(*values)
+
+    function.__name__ = function.__qualname__ = _identifier(name)
+    function.__module__ = __name__
+    function.__signature__ = signature
+    function.__doc__ = _help(stage, fields)
+    return function
+
+
+stages = []
+for _stage in _osteo.declarations():
+    _f = _function(_stage)
+    globals()[_f.__name__] = _f
+    stages.append(_f.__name__)
+__all__ = ["Error", "Grid", "Image", "Labels", "Surface", "Tets", "stages", *stages]

@@ -1,0 +1,41 @@
+# cmake --install: programs, what they share, and the libraries for other projects (find_package(osteo)).
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# Components are what packages are made of (package.cmake): server, window, dev.
+install(TARGETS osteo RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT server)
+if(OSTEO_WINDOW)
+  install(TARGETS osteo-rehearse osteo-edit osteo-console osteo-experiment RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT window)
+  install(FILES apps/share/osteo.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT window)
+  install(FILES apps/share/osteo.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT window)
+  install(FILES apps/share/osteo.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT window)
+endif()
+install(FILES apps/share/70-osteotome.rules DESTINATION lib/udev/rules.d COMPONENT server)
+install(FILES apps/share/osteo-receive.service apps/share/osteo-watch.service DESTINATION lib/systemd/system COMPONENT server)
+install(DIRECTORY pipelines/ DESTINATION ${CMAKE_INSTALL_DATADIR}/osteo/pipelines COMPONENT server)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT server)
+install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT server)
+# Man pages, completion and modules of 3D Slicer are made from the declarations, by the program that is installed.
+install(CODE "
+  execute_process(COMMAND \"$<TARGET_FILE:osteo>\" docs --shared \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}\" --quiet
+    COMMAND_ERROR_IS_FATAL ANY)
+  message(STATUS \"Man pages, completion and modules of 3D Slicer are in \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}\")" COMPONENT server)
+
+# The window's own library stays inside.
+set(OSTEO_COMPONENTS ${OSTEO_LAYERS})
+list(REMOVE_ITEM OSTEO_COMPONENTS window)
+foreach(name ${OSTEO_COMPONENTS})
+  if(NOT TARGET osteo_${name})
+    list(REMOVE_ITEM OSTEO_COMPONENTS ${name})
+    continue()
+  endif()
+  set_target_properties(osteo_${name} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS osteo_${name} EXPORT osteoTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/osteo COMPONENT dev)
+  install(DIRECTORY libs/${name}/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.h")
+endforeach()
+set(config ${CMAKE_INSTALL_LIBDIR}/cmake/osteo)
+install(EXPORT osteoTargets NAMESPACE osteo:: DESTINATION ${config} COMPONENT dev)
+configure_package_config_file(libs/cmake/osteoConfig.cmake.in ${CMAKE_BINARY_DIR}/osteoConfig.cmake INSTALL_DESTINATION ${config})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/osteoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/osteoConfig.cmake ${CMAKE_BINARY_DIR}/osteoConfigVersion.cmake libs/cmake/dependencies.cmake
+  DESTINATION ${config} COMPONENT dev)

@@ -1,0 +1,468 @@
+"""send, fetch and receive against programs nobody here wrote: Orthanc, DCMTK's storescu and echoscu; then against peers that lie.
+usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, tls or units"""
+import contextlib, json, os, pathlib, shutil, signal, socket, struct, subprocess, sys, time, urllib.request, warnings
+
+if missing := [p for p in ("Orthanc", "storescu", "echoscu", "openssl") if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin")]:
+    print(f"skipped: {', '.join(missing)} not installed (Debian: orthanc, dcmtk, openssl)")
+    sys.exit(77)
+try:
+    import highdicom, pydicom
+except ImportError as e:
+    print(f"skipped: {e}")
+    sys.exit(77)
+part, bin_dir, work = sys.argv[1], *(pathlib.Path(a).resolve() for a in sys.argv[2:4])
+osteo = bin_dir / "osteo"
+shutil.rmtree(work, ignore_errors=True)
+work.mkdir(parents=True)
+os.environ["PATH"] += ":/usr/sbin"  # where Debian has Orthanc
+os.chdir(work)
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def run(*args, rc=0):
+    r = subprocess.run([str(a) for a in args], capture_output=True, text=True)
+    assert r.returncode == rc, (args, r.returncode, r.stdout[-2000:], r.stderr[-2000:])
+    return r
+
+
+def until(what, seconds=120):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if (got := what()) is not None and got is not False:
+            return got
+        time.sleep(0.1)
+    raise AssertionError(f"waited in vain: {what.__doc__ or what}")
+
+
+class Receiver:
+    def __init__(self, folder, *flags):
+        self.folder = work / folder
+        self.log = open(work / f"{folder}.log", "w")
+        self.process = subprocess.Popen([osteo, "receive", self.folder, "--port", "0", "--json", "--keep-free-gb", "0", *flags], stdout=subprocess.PIPE,
+                                        stderr=self.log, text=True)
+        self.port = json.loads(self.process.stdout.readline())["listening"]
+
+    def closed(self):
+        return json.loads(self.process.stdout.readline())
+
+    def stop(self):
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(60) in (0, 130), self.process.returncode
+
+    def objects(self):
+        return sorted(self.folder.glob("study-*/series-*/*.dcm"))
+
+    def incoming(self):
+        return list((self.folder / ".incoming").iterdir())
+
+
+def make_scan():
+    run(osteo, "phantom", "ct", "--region", "temporal", "--spacing-mm", "2", "--quiet")
+    files = sorted(p for p in (work / "ct").rglob("*") if p.is_file())
+    assert len(files) > 10, files
+    return files
+
+
+def data_set(path):
+    """What lies behind the file meta information: a node may write its own."""
+    raw = pathlib.Path(path).read_bytes()
+    meta = pydicom.filereader.read_file_meta_info(path)
+    return raw[144 + meta.FileMetaInformationGroupLength:]
+
+
+def ct_series(ask):
+    return next(i for i in ask("/series") if ask(f"/series/{i}")["MainDicomTags"]["Modality"] == "CT")
+
+
+@contextlib.contextmanager
+def orthanc(dicom, http, receiver_port):
+    folder = work / "orthanc"
+    config = {"StorageDirectory": str(folder), "IndexDirectory": str(folder), "HttpPort": http, "DicomPort": dicom, "DicomAet": "ORTHANC",
+              "RemoteAccessAllowed": False, "AuthenticationEnabled": False, "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": False,
+              "DicomAlwaysAllowEcho": False, "DicomAlwaysAllowFind": False, "DicomAlwaysAllowGet": False, "Plugins": [],
+              "DicomModalities": {"osteotome": {"AET": "OSTEOTOME", "Host": "127.0.0.1", "Port": receiver_port, "AllowEcho": True, "AllowFind": True,
+                                                "AllowGet": True, "AllowMove": True, "AllowStore": True}}}
+    (work / "orthanc.json").write_text(json.dumps(config))
+    with open(work / "orthanc.log", "w") as log:
+        process = subprocess.Popen(["Orthanc", "orthanc.json"], stdout=log, stderr=log)
+        try:
+            def up():
+                try:
+                    return urllib.request.urlopen(f"http://127.0.0.1:{http}/system", timeout=5).status == 200
+                except OSError:
+                    return False
+            until(up)
+            yield lambda path, data=None: json.load(urllib.request.urlopen(
+                urllib.request.Request(f"http://127.0.0.1:{http}{path}", data=None if data is None else json.dumps(data).encode()), timeout=120))
+        finally:
+            process.terminate()
+            process.wait(60)
+
+
+def round_trip():
+    files = make_scan()
+    n = len(files)
+    (work / "ct" / "notes.txt").write_text("no object")
+    receiver = Receiver("inbox", "--allow", "ORTHANC", "--quiet-s", "2")
+    dicom, http = free_port(), free_port()
+    peer = f"ORTHANC@127.0.0.1:{dicom}"
+    with orthanc(dicom, http, receiver.port) as ask:
+        dry = json.loads(run(osteo, "send", "ct", "--peer", peer, "--dry-run", "--json").stdout)
+        assert dry["kinds"][0]["objects"] == n and dry["kinds"][0]["kind"] == "CT Image Storage" and dry["set_aside"] == 1, dry
+        assert ask("/instances") == [], "dry means dry"
+        begin = time.monotonic()
+        sent = json.loads(run(osteo, "send", "ct", "--peer", peer, "--json", "--quiet").stdout)
+        print(f"send: {n} slices in {time.monotonic() - begin:.2f} s")
+        assert (sent["objects"], sent["accepted"], sent["safe"], sent["checked"]) == (n, n, n, True), sent
+        assert len(ask("/instances")) == n
+        # What is made of it goes to the same study: a segmentation and a surface, each under a presentation context of its own.
+        run(osteo, "import", "ct", "ct.nrrd", "--quiet")
+        run(osteo, "threshold", "ct.nrrd", "mask.nrrd", "--lower", "300", "--quiet")
+        run(osteo, "resample", "ct.nrrd", "mask.nrrd", "bone.vdb", "--quiet")
+        run(osteo, "surface", "bone.vdb", "bone.stl", "--quiet")
+        (work / "results").mkdir()
+        for name in ("mask.nrrd", "bone.stl"):
+            run(osteo, "convert", name, f"results/{name[:4]}.dcm", "--source", "ct", "--quiet")
+        sent = json.loads(run(osteo, "send", "results", "--peer", peer, "--json", "--quiet").stdout)
+        assert sent["safe"] == 2 and len(ask("/studies")) == 1, sent
+        assert sorted(ask(f"/series/{i}")["MainDicomTags"]["Modality"] for i in ask("/series")) == ["CT", "M3D", "SEG"]
+        # Titles: ours unknown to it, its own wrong.
+        r = run(osteo, "send", "ct", "--peer", peer, "--ae", "NOBODY", rc=7)
+        assert "refuses NOBODY" in r.stderr, r.stderr
+        r = run(osteo, "send", "ct", "--peer", f"WRONG@127.0.0.1:{dicom}", rc=7)
+        assert "WRONG" in r.stderr and "refuses OSTEOTOME" in r.stderr, r.stderr
+        r = run(osteo, "send", "ct", "--peer", f"ORTHANC@127.0.0.1:{free_port()}", "--timeout-s", "5", rc=7)
+        assert "cannot be reached" in r.stderr, r.stderr
+        run(osteo, "send", "mask.nrrd", "--peer", peer, rc=3)
+        # What it has, and back.
+        head = pydicom.dcmread(files[0], stop_before_pixels=True)
+        run(osteo, "fetch", "--peer", peer, rc=2)
+        run(osteo, "fetch", "--peer", peer, "--study", "1.2.3.4.5", rc=3)
+        run(osteo, "fetch", "--peer", peer, "--study", "1.2*", rc=2)
+        listed = json.loads(run(osteo, "fetch", "--peer", peer, "--study", head.StudyInstanceUID, "--modality", "CT", "--json").stdout)
+        assert [(s["series"], s["images"], s["modality"]) for s in listed] == [(head.SeriesInstanceUID, n, "CT")], listed
+        begin = time.monotonic()
+        got = json.loads(run(osteo, "fetch", "--peer", peer, "--series", head.SeriesInstanceUID, "--study", head.StudyInstanceUID, "-o", "back", "--json", "--quiet").stdout)
+        print(f"fetch: {got['images']} slices in {time.monotonic() - begin:.2f} s")
+        assert got["images"] == n
+        uid = lambda p: pydicom.dcmread(p, stop_before_pixels=True).SOPInstanceUID
+        ours = {uid(p): data_set(p) for p in files}
+        assert {uid(p): data_set(p) for p in (work / "back").iterdir()} == ours, "bit for bit"
+        run(osteo, "fetch", "--peer", peer, "--series", head.SeriesInstanceUID, "--study", head.StudyInstanceUID, "-o", "back", rc=6)
+        r = run(osteo, "fetch", "--peer", peer, "--series", head.SeriesInstanceUID, "--study", head.StudyInstanceUID, "-o", "small", "--series-gb", "0.0001", rc=9)
+        assert not (work / "small").exists() and "larger than allowed" in r.stderr, r.stderr
+        r = run(osteo, "fetch", "--peer", peer, "--study", head.StudyInstanceUID, "-o", "all", rc=2)
+        assert "3 series match" in r.stderr, r.stderr
+        run(osteo, "import", "back", "back.nrrd", "--quiet")
+        (seg,) = (s["series"] for s in json.loads(run(osteo, "fetch", "--peer", peer, "--study", head.StudyInstanceUID, "--modality", "SEG", "--json").stdout))
+        run(osteo, "fetch", "--peer", peer, "--study", head.StudyInstanceUID, "--series", seg, "-o", "seg", "--quiet")
+        assert highdicom.seg.segread(work / "seg" / "000001.dcm").number_of_segments == 1
+        # It sends to us.
+        begin = time.monotonic()
+        moved = ask("/modalities/osteotome/store", ct_series(ask))
+        print(f"receive: {n} slices in {time.monotonic() - begin:.2f} s")
+        assert moved["FailedInstancesCount"] == 0 and moved["InstancesCount"] == n, moved
+        closed = receiver.closed()
+        assert closed["objects"] == n, closed
+        assert {uid(p): data_set(p) for p in receiver.objects()} == ours, "bit for bit"
+        assert head.StudyInstanceUID not in str(receiver.objects()[0]), "no UID in a name"
+        run(osteo, "import", closed["closed"], "received.nrrd", "--quiet")
+        # The same again: nothing new, no error; a late slice opens the series again.
+        moved = ask("/modalities/osteotome/store", ct_series(ask))
+        assert moved["FailedInstancesCount"] == 0 and len(receiver.objects()) == n
+        late = pydicom.dcmread(files[0])
+        late.SOPInstanceUID = late.file_meta.MediaStorageSOPInstanceUID = late.SOPInstanceUID + ".1"
+        late.save_as("late.dcm", enforce_file_format=True)
+        run(osteo, "send", "late.dcm", "--peer", peer, "--quiet")
+        ask("/modalities/osteotome/store",
+            [i for i in ask("/instances") if ask(f"/instances/{i}")["MainDicomTags"]["SOPInstanceUID"] == late.SOPInstanceUID][0])
+        assert receiver.closed()["objects"] == n + 1
+        # Our own work comes back from there with the scan: none of it runs, or results would make results without end.
+        moved = ask("/modalities/osteotome/store", ask("/studies")[0])
+        assert moved["FailedInstancesCount"] == 0, moved
+        told = [json.loads(text) for text in run(osteo, "watch", "inbox", "--rules", pathlib.Path(__file__).resolve().parents[2] / "pipelines" / "rules.json", "-o", "watched",
+                                                 "--once", "--quiet-s", "0.1", "--json", "--quiet").stdout.splitlines()]
+        assert sorted((e["what"], e["objects"]) for e in told) == [("unmatched", 1), ("unmatched", 1), ("unmatched", n + 1)], told
+    receiver.stop()
+
+
+def hostile():
+    warnings.simplefilter("ignore")  # of values that are wrong on purpose
+    files = make_scan()
+    storescu = lambda port, *paths, calling="PEER", called="OSTEOTOME", rc=None: subprocess.run(
+        ["storescu", "-aet", calling, "-aec", called, "127.0.0.1", str(port), *map(str, paths)], capture_output=True, text=True)
+    r = run(osteo, "receive", "x", rc=2)
+    assert "nobody may send" in r.stderr, r.stderr
+    run(osteo, "receive", "x", "--allow", "A\\B", rc=2)
+    run(osteo, "receive", "x", "--anybody", "--bind", "localhost", rc=2)
+    node = Receiver("inbox", "--allow", "PEER", "--quiet-s", "1", "--associations", "8", "--object-gb", "0.002", "--timeout-s", "3", "--metrics", "metrics.txt")
+    counter = lambda name: next((int(line.split()[1]) for line in pathlib.Path("metrics.txt").read_text().splitlines() if line.startswith(f"osteotome_receive_{name}_total ")), 0) if pathlib.Path("metrics.txt").exists() else 0
+    memory = lambda: int(next(line for line in pathlib.Path(f"/proc/{node.process.pid}/status").read_text().splitlines() if line.startswith("VmRSS")).split()[1])
+    # It listens on this machine alone.
+    listening = subprocess.run(["cat", "/proc/net/tcp"], capture_output=True, text=True).stdout
+    assert f"0100007F:{node.port:04X}" in listening and f"00000000:{node.port:04X}" not in listening
+    assert subprocess.run(["echoscu", "-aet", "PEER", "-aec", "OSTEOTOME", "127.0.0.1", str(node.port)]).returncode == 0
+    # Titles.
+    for calling, called in (("NOBODY", "OSTEOTOME"), ("PEER", "OTHER"), ("peer", "OSTEOTOME")):
+        assert storescu(node.port, files[0], calling=calling, called=called).returncode != 0
+    assert node.objects() == []
+    # One that is good, before and after all that follows.
+    assert storescu(node.port, files[0]).returncode == 0 and len(node.objects()) == 1
+    node.closed()
+    before = memory()
+
+    def changed(name, **values):
+        d = pydicom.dcmread(files[1])
+        for key, value in values.items():
+            setattr(d, key, value)
+            if key == "SOPInstanceUID":
+                d.file_meta.MediaStorageSOPInstanceUID = value
+        d.save_as(name, enforce_file_format=False)
+        return name
+
+    # Tricks with UIDs, in each of them.
+    pydicom.config.settings.writing_validation_mode = pydicom.config.IGNORE
+    tricks = [("SOPInstanceUID", "../../../../tmp/evil"), ("StudyInstanceUID", "../../../evil"), ("SeriesInstanceUID", "/etc/evil"), ("StudyInstanceUID", ""),
+              ("SOPInstanceUID", "1.2..3"), ("SeriesInstanceUID", "1" * 65)]
+    for n, (key, value) in enumerate(tricks):
+        storescu(node.port, changed(f"trick-{n}.dcm", **{key: value}))
+    # Another object under a UID that is there.
+    other = pydicom.dcmread(files[0])
+    other.PixelData = bytes(len(other.PixelData))
+    other.save_as("other.dcm")
+    original = node.objects()[0].read_bytes()
+    said = storescu(node.port, "other.dcm")
+    assert len(node.objects()) == 1 and node.objects()[0].read_bytes() == original, "never written over"
+    # Larger than allowed.
+    large = pydicom.dcmread(files[2])
+    large.PixelData = bytes(4_000_000)
+    large.save_as("large.dcm")
+    storescu(node.port, "large.dcm")
+    assert len(node.objects()) == 1, [p.stat().st_size for p in node.objects()]
+
+    def talk(data, wait=0.0, close=True):
+        s = socket.create_connection(("127.0.0.1", node.port), timeout=10)
+        with contextlib.suppress(OSError):
+            s.sendall(data)
+            time.sleep(wait)
+            if close:
+                s.shutdown(socket.SHUT_WR)
+                while s.recv(4096):
+                    pass
+        if close:
+            s.close()
+        return s
+
+    def request(called=b"OSTEOTOME", calling=b"PEER", items=b""):
+        if not items:
+            syntax = b"1.2.840.10008.1.2.1"
+            item = lambda kind, body: struct.pack(">BBH", kind, 0, len(body)) + body
+            items = item(0x10, b"1.2.840.10008.3.1.1.1") + item(0x20, b"\x01\0\0\0" + item(0x30, b"1.2.840.10008.5.1.4.1.1.2") + item(0x40, syntax)) + item(
+                0x50, item(0x51, struct.pack(">I", 16384)) + item(0x52, b"1.2.3"))
+        body = struct.pack(">HH", 1, 0) + called.ljust(16) + calling.ljust(16) + bytes(32) + items
+        return struct.pack(">BBI", 1, 0, len(body)) + body
+
+    talk(b"")
+    talk(b"GET / HTTP/1.1\r\n\r\n")
+    talk(os.urandom(10000))
+    talk(struct.pack(">BBI", 1, 0, 0xFFFFFFFF) + bytes(1000))  # says it is 4 GB long
+    talk(struct.pack(">BBI", 4, 0, 0x7FFFFFFF) + bytes(100000))
+    good = request()
+    for cut in (1, 5, 6, 40, 74, len(good) - 1):
+        talk(good[:cut])
+    talk(request(called=b"\xff" * 16))
+    talk(request(items=struct.pack(">BBH", 0x20, 0, 65535) + bytes(100)))
+    talk(good + struct.pack(">BBI", 4, 0, 12) + struct.pack(">IBB", 0xFFFFFFF0, 1, 3) + bytes(6))  # a length that does not fit
+    talk(good + b"".join(struct.pack(">BBI", 4, 0, 106) + struct.pack(">IBB", 102, 1, 1) + os.urandom(100) for _ in range(2000)), 0.2)  # commands without end
+    # A dataset that says it is 100 GB, and one of sequences within sequences.
+    deep = pydicom.dcmread(files[3])
+    inner = pydicom.Dataset()
+    for _ in range(200):
+        outer = pydicom.Dataset()
+        outer.RequestAttributesSequence = [inner]
+        inner = outer
+    deep.RequestAttributesSequence = [inner]
+    deep.save_as("deep.dcm")
+    storescu(node.port, "deep.dcm")
+    # Two hundred at once who say nothing: some are told that it is busy, and they are gone after their time.
+    idle = [talk(b"", close=False) for _ in range(200)]
+    until(lambda: counter("refused_associations") >= 190)
+    children = lambda: len(subprocess.run(["pgrep", "-P", str(node.process.pid)], capture_output=True, text=True).stdout.split())
+    assert children() <= 8, children()
+    until(lambda: children() == 0)
+    for s in idle:
+        s.close()
+    # A thousand connections that are given up.
+    for _ in range(1000):
+        socket.create_connection(("127.0.0.1", node.port), timeout=10).close()
+    until(lambda: children() == 0)
+    assert storescu(node.port, *files[4:8]).returncode == 0, "it still serves"
+    kept = len(node.objects())
+    assert kept in (5, 6), kept  # deep.dcm is a right one, if deep
+    until(lambda: node.closed()["objects"] == kept)
+    assert node.incoming() == [], "nothing half is left"
+    assert memory() < before + 20_000, (before, memory())
+    until(lambda: counter("stored") == kept)
+    assert counter("refused") >= 4, pathlib.Path("metrics.txt").read_text()
+    inside = {p.parent.parent.parent for p in work.rglob("*.dcm") if p.parent.name.startswith("series-")}
+    assert inside == {node.folder} and not pathlib.Path("/tmp/evil").exists() and not list(work.parent.glob("*evil*"))
+    node.stop()
+    # Killed while a slice comes in: the next start clears it away, and closes what was still open.
+    for closed in node.folder.glob("study-*/series-*/CLOSED"):
+        closed.unlink()
+    (node.folder / ".incoming" / "1-0").write_bytes(b"half")
+    again = Receiver("inbox", "--anybody", "--quiet-s", "1", "--folder-gb", "0.00001")
+    assert again.incoming() == [] and again.closed()["objects"] == kept
+    storescu(again.port, files[9])
+    assert len(again.objects()) == kept, "the folder is as large as it may be"
+    again.stop()
+
+
+def watch():
+    files = make_scan()
+    warnings.simplefilter("ignore")
+    rules = {"osteotome_rules": 1, "rules": [
+        {"name": "overviews", "any_of": ["topogram"], "ignore": True},
+        {"name": "ear", "modality": "CT", "any_of": ["petrous"], "slice_mm": [0.1, 3], "least_objects": 5, "set": {"spacing_mm": "3", "lower": "300"}}]}
+    (work / "rules.json").write_text(json.dumps(rules))
+    (work / "wrong.json").write_text(json.dumps(rules).replace("spacing_mm", "spacing_m"))
+    inbox, out = work / "inbox", work / "out"
+    inbox.mkdir()
+
+    def series(folder, uid, description="Petrous bone", modality="CT", of=files):
+        (inbox / folder).mkdir(exist_ok=True)
+        for n, path in enumerate(of):
+            d = pydicom.dcmread(path)
+            d.SeriesInstanceUID, d.SeriesDescription, d.Modality, d.SliceThickness = uid, description, modality, "2"
+            d.SOPInstanceUID = d.file_meta.MediaStorageSOPInstanceUID = f"{uid}.{d.InstanceNumber}"
+            d.PatientName = "WATCHED^PERSON"
+            d.save_as(inbox / folder / f"{uid}-{n}.dcm")
+
+    line = [osteo, "watch", inbox, "--rules", "rules.json", "-o", out, "--quiet-s", "0.5", "--poll-s", "0.2", "--json", "--no-report", "--keep-free-mb", "0"]
+    events = lambda *more, rc=0: [json.loads(text) for text in run(*line, "--once", "--quiet", *more, rc=rc).stdout.splitlines()]
+    what = lambda told: sorted(e["what"] for e in told)
+    # What is wrong is told before anything is made.
+    r = run(osteo, "watch", inbox, "--rules", "wrong.json", "-o", out, rc=2)
+    assert "spacing_m" in r.stderr and "spacing_mm" in r.stderr and not out.exists(), r.stderr
+    run(osteo, "watch", inbox, "-o", out, rc=2)
+    run(osteo, "watch", inbox, "--rules", "rules.json", "-o", inbox / "out", rc=2)
+    run(osteo, "watch", work / "nowhere", "--rules", "rules.json", "-o", out, rc=3)
+    run(osteo, "watch", inbox, "--rules", "rules.json", "-o", work / "ct", rc=6)
+    # A good one; one to ignore, one without a rule, our own, a file that is no object, and a hidden one.
+    series("a", "1.2.3.1", of=files[:-1])
+    series("b", "1.2.3.2", "Topogram", of=files[:1])
+    series("c", "1.2.3.3", "Petrous bone", "MR", of=files[:1])
+    (inbox / "own").mkdir()
+    shutil.copy(files[0], inbox / "own")
+    (inbox / "a" / "notes.txt").write_text("no object")
+    (inbox / ".half").write_bytes(b"half")
+    told = events("--metrics", "watch.prom")
+    assert what(told) == ["begun", "done", "ignored", "unmatched", "unmatched"], told
+    done = next(e for e in told if e["what"] == "done")
+    assert (done["rule"], done["objects"]) == ("ear", len(files) - 1) and (pathlib.Path(done["case"]) / "manifest.json").exists(), done
+    assert {e["why"] for e in told if e["what"] == "unmatched"} == {"made by this program",
+                                                                  "'overviews': its description has none of the words; 'ear': another modality than CT"}, told
+    assert "osteotome_watch_done_total 1\n" in (work / "watch.prom").read_text()
+    # The same again, also with other times: nothing. What no rule has is told again, since rules may have changed.
+    (inbox / "a" / next(iter(sorted(os.listdir(inbox / "a"))))).touch()
+    assert what(events()) == ["ignored", "unmatched", "unmatched"]
+    # A late slice: another case beside the first, which stays as it is.
+    before = {p: p.read_bytes() for p in pathlib.Path(done["case"]).rglob("*") if p.is_file()}
+    series("late", "1.2.3.1", of=files[-1:])
+    again = next(e for e in events() if e["what"] == "done")
+    assert again["case"] == done["case"] + "-2" and again["objects"] == len(files), again
+    assert before == {p: p.read_bytes() for p in before}
+    assert len(list((out / "sources" / pathlib.Path(again["case"]).name).iterdir())) == len(files), "of two folders"
+    shutil.rmtree(inbox / "late")
+    assert "begun" not in what(events()), "taken away is nothing new"
+    # Killed as soon as it begins, twice: the same case, once.
+    series("d", "1.2.3.4")
+    for _ in range(2):
+        with subprocess.Popen([str(a) for a in line] + ["--quiet"], stdout=subprocess.PIPE, text=True) as watcher:
+            until(lambda: json.loads(watcher.stdout.readline())["what"] in ("begun", "done"))
+            watcher.kill()
+    told = events()
+    made = sorted(p.name for p in (out / "cases").iterdir() if p.is_dir())
+    (ended,) = (name for name in made if not name.startswith(pathlib.Path(done["case"]).name))
+    assert len(made) == 3 and (out / "cases" / ended / "manifest.json").exists(), made
+    assert json.loads((out / "records" / f"{ended}.json").read_text())["state"] == "done"
+    # Two at once into one folder: the second gives up.
+    with subprocess.Popen([str(a) for a in line], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watcher:
+        watcher.stdout.readline()
+        assert "another watcher" in run(*line, "--once", rc=6).stderr
+        watcher.terminate()
+    # One that fails is told, with an exit code, and not tried for ever.
+    series("e", "1.2.3.5", of=files[:6])
+    for path in (inbox / "e").iterdir():
+        d = pydicom.dcmread(path)
+        del d.PixelData
+        d.save_as(path)
+    assert "refused" in what(events(rc=8))
+    assert "begun" not in what(events())
+    # No identity in the journal, nor in what was said.
+    for path in (out / "records").iterdir():
+        assert not any(word in path.read_text() for word in ("WATCHED", "1.2.3.", "Petrous")), path
+
+
+def tls():
+    files = make_scan()
+    for name, issuer in (("ca", None), ("ours", "ca"), ("node", "ca"), ("other-ca", None), ("stranger", "other-ca")):
+        signed = ["-CA", f"{issuer}.pem", "-CAkey", f"{issuer}.key"] if issuer else []
+        run("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.pem",
+            "-addext", "basicConstraints=critical,CA:" + ("FALSE" if issuer else "TRUE"), *signed)
+    with_tls = lambda name, ca="ca": ["--tls-ca", f"{ca}.pem", "--tls-certificate", f"{name}.pem", "--tls-key", f"{name}.key"]
+    for flags in (["--tls-ca", "ca.pem"], ["--tls-ca", "ca.pem", "--tls-certificate", "node.pem"], ["--tls-certificate", "node.pem", "--tls-key", "node.key"]):
+        run(osteo, "receive", "x", "--anybody", "--port", "0", *flags, rc=2)
+    run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "nowhere.pem", "--tls-certificate", "node.pem", "--tls-key", "node.key", rc=3)
+    for pair in (("node.pem", "ours.key"), ("node.key", "node.key"), ("node.pem", files[0])):
+        run(osteo, "receive", "x", "--anybody", "--port", "0", "--tls-ca", "ca.pem", "--tls-certificate", pair[0], "--tls-key", pair[1], rc=5)
+    node = Receiver("inbox", "--allow", "PEER", "--quiet-s", "1", "--timeout-s", "5", *with_tls("node"))
+    send = lambda *flags, rc=0: run(osteo, "send", "ct", "--peer", f"OSTEOTOME@127.0.0.1:{node.port}", "--ae", "PEER", "--no-check", "--timeout-s", "5", "--quiet", *flags, rc=rc)
+    # Nobody without a certificate of ours, and none from elsewhere; nor do we speak to a node that has another.
+    send(rc=7)
+    send("--tls-ca", "ca.pem", rc=7)
+    send(*with_tls("stranger"), rc=7)
+    send(*with_tls("ours", "other-ca"), rc=7)
+    # Nor TLS of old, nor one who says nothing.
+    old = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{node.port}", "-tls1_1", "-cert", "ours.pem", "-key", "ours.key"], capture_output=True, input=b"")
+    assert b"Cipher is (NONE)" in old.stdout, old.stdout
+    silent = socket.create_connection(("127.0.0.1", node.port))
+    assert node.objects() == []
+    begin = time.monotonic()
+    send(*with_tls("ours"))
+    print(f"send over TLS: {len(files)} slices in {time.monotonic() - begin:.2f} s")
+    assert sorted(map(data_set, node.objects())) == sorted(map(data_set, files)), "bit for bit"
+    assert node.closed()["objects"] == len(files)
+    silent.settimeout(60)
+    assert silent.recv(1) == b"", "it is hung up on"
+    # Programs of others: DCMTK's, with TLS.
+    said = subprocess.run(["storescu", "-aet", "PEER", "-aec", "OSTEOTOME", "+tls", "ours.key", "ours.pem", "+cf", "ca.pem", "127.0.0.1", str(node.port), str(files[0])],
+                          capture_output=True, text=True)
+    assert said.returncode == 0, said.stderr
+    node.stop()
+
+
+def units():
+    if not shutil.which("systemd-analyze"):
+        print("skipped: systemd-analyze not installed (Debian: systemd)")
+        sys.exit(77)
+    share = pathlib.Path(__file__).resolve().parents[2] / "apps" / "share"
+    for name in ("osteo-receive.service", "osteo-watch.service"):
+        text = (share / name).read_text()
+        assert "/usr/bin/osteo " in text
+        (work / name).write_text(text.replace("/usr/bin/osteo", str(osteo)))
+        r = run("systemd-analyze", "verify", "--man=no", work / name)
+        assert r.stderr == "", r.stderr
+        # What it calls is there.
+        called = next(line for line in text.splitlines() if line.startswith("ExecStart=")).split()
+        known = run(osteo, called[1], "--help").stdout
+        assert all(flag in known for flag in called if flag.startswith("--")), called
+
+
+{"orthanc": round_trip, "hostile": hostile, "watch": watch, "tls": tls, "units": units}[part]()
+print(f"pacs {part}: all as it should be")

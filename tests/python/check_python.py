@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+"""The Python module as a script uses it: stages on arrays without copies, errors with codes, the same voxels as the program."""
+import gc
+import inspect
+import sys
+import time
+
+try:
+    import numpy as np
+except ImportError:
+    print("numpy is not installed")
+    sys.exit(77)
+import osteo
+
+
+def fails(call, code, word):
+    try:
+        call()
+    except osteo.Error as e:
+        assert e.code == code, (e.code, str(e))
+        assert word in str(e), str(e)
+        return
+    raise AssertionError(f"no error that says {word}")
+
+
+# Every stage is a function with a signature and help.
+assert len(osteo.stages) > 20, osteo.stages
+for name in osteo.stages:
+    function = getattr(osteo, name)
+    assert function.__doc__ and "Returns" in function.__doc__, name
+    inspect.signature(function)
+assert inspect.signature(osteo.threshold).parameters["lower"].kind is inspect.Parameter.KEYWORD_ONLY
+
+# In and out without copies.
+voxels = np.full((20, 24, 28), -1000, np.int16)
+voxels[5:15, 6:18, 7:21] = 1200
+ct = osteo.Image(voxels, spacing_mm=(0.5, 0.6, 0.7), origin_mm=(1, 2, 3))
+assert ct.voxels.ctypes.data == voxels.ctypes.data and np.shares_memory(ct.voxels, voxels)
+assert ct.shape == [20, 24, 28] and ct.spacing_mm == [0.5, 0.6, 0.7] and ct.origin_mm == [1, 2, 3]
+assert not ct.voxels.flags.writeable
+
+# What a stage found is what numpy finds.
+report = {}
+mask = osteo.threshold(ct, lower=500, report=report)
+assert isinstance(mask, osteo.Labels) and report
+assert np.array_equal(mask.voxels, (voxels >= 500).astype(np.uint8))
+view = mask.voxels
+assert view.ctypes.data == mask.voxels.ctypes.data
+del mask
+gc.collect()
+assert view.sum() == 10 * 12 * 14, "a view keeps the memory alive"
+
+# The array lives as long as the image does.
+before = sys.getrefcount(voxels)
+second = osteo.Image(voxels)
+assert sys.getrefcount(voxels) > before
+del second
+gc.collect()
+assert sys.getrefcount(voxels) == before
+
+# Refused in words, with the exit code of the programs.
+fails(lambda: osteo.Image(voxels.astype(np.float64)), 2, "int16")
+fails(lambda: osteo.Image(voxels[:, ::2]), 2, "contiguous")
+fails(lambda: osteo.Image(voxels, spacing_mm=(0, 1, 1)), 4, "spacing")
+fails(lambda: osteo.threshold(ct, lower="many"), 2, "lower")
+fails(lambda: osteo.threshold(ct, lower=1e9), 2, "lower")
+fails(lambda: osteo.threshold(3, lower=500), 2, "int")
+fails(lambda: osteo.threshold("nothing-here.nrrd"), 3, "nothing-here")
+try:
+    osteo.threshold(ct, lowest=1)
+    raise AssertionError("an unknown parameter was taken")
+except TypeError as e:
+    assert "lowest" in str(e)
+
+small = osteo.Image(np.zeros((4, 4, 4), np.int16))
+seconds = []
+for _ in range(50):
+    begun = time.perf_counter()
+    osteo.threshold(small, lower=-500, threads=1)
+    seconds.append(time.perf_counter() - begun)
+print(f"{len(osteo.stages)} stages; threshold of 64 voxels: {min(seconds) * 1e3:.3f} ms a call at best, {sorted(seconds)[25] * 1e3:.3f} ms the median")
+
+# From a phantom to a closed surface, all in memory.
+ct, *_ = osteo.phantom(spacing_mm=2.0, seed=1)
+bone = osteo.resample(ct, osteo.threshold(ct, lower=500), spacing_mm=2.0, lower=500)
+bone = bone if isinstance(bone, osteo.Grid) else bone[0]
+assert isinstance(bone, osteo.Grid) and bone.active_voxels > 1000
+surface = osteo.surface(bone)
+surface = surface if isinstance(surface, osteo.Surface) else surface[0]
+assert surface.points_mm.dtype == np.float32 and surface.triangles.dtype == np.uint32
+assert surface.triangles.max() == len(surface.points_mm) - 1
+edges = np.sort(np.concatenate([surface.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]), axis=1)
+assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all(), "the surface is closed"
+print(f"phantom: {bone.active_voxels} voxels, {len(surface.triangles)} triangles")

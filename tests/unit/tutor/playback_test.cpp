@@ -1,0 +1,315 @@
+// A recorded hand leads another: how near it stays, that bone is the recorded one, that the guided session replays to the bit.
+#include "osteo/tutor/playback.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bar.h"
+#include "osteo/base/error.h"
+#include "osteo/bone/instrument.h"
+#include "osteo/scene/rehearsal.h"
+#include "scratch.h"
+
+namespace osteo {
+namespace {
+
+namespace fs = std::filesystem;
+
+World bar() {
+  return World(test::bar(0.5, 0.3));
+}
+
+// A groove along the bar's upper face (z = 4), with a rest in it.
+Script groove() {
+  Script s;
+  s.tool = burr_index(BurrKind::cutting, 4);
+  s.waypoints = {{0, {-6, 0, 8}, true},  {0.3, {-6, 0, 5}, true},  {1.3, {0, 1, 4}, true, 0.7},
+                 {1.6, {0, 1, 4}, true}, {2.4, {6, 0, 4.5}, true}, {2.6, {6, 0, 9}, false}};
+  return s;
+}
+
+std::string record(const Script& script, const fs::path& file, std::vector<SceneAction> actions = {}) {
+  RehearsalOptions o;
+  o.session_file = file;
+  o.haptics.device = SpringHand::traits();
+  o.haptics.more_devices.assign(script.more_hands.size(), SpringHand::traits());
+  o.actions = std::move(actions);
+  Rehearsal r(bar(), devices_of(script, 1000), o, {});
+  return r.run_to_end({}).bone_hash;
+}
+
+struct Played {
+  RehearsalSummary summary;
+  GuidedFacts facts;
+  std::shared_ptr<Playback> playback;
+};
+
+Played play(const fs::path& expert, const PlaybackParams& params, double hand_n_per_m, const fs::path& file, Vec3 off = {0, 0, 2}) {
+  const SessionReader session(expert);
+  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(session, 0, 0)), params);
+  const DeviceSample& first = playback->lesson->hands.front().front();
+  RehearsalOptions o;
+  o.session_file = file;
+  auto devices =
+      playback_devices(std::make_unique<FollowingHand>(hand_n_per_m, from_floats(first.position_mm) + off, playback), playback, o.haptics);
+  o.actions = playback_actions(*playback);
+  Rehearsal r(bar(), std::move(devices), o, {});
+  Played p{r.run_to_end({}), {}, playback};
+  p.facts = measure_guided(SessionReader(file), playback->begun);
+  return p;
+}
+
+bool replays(const fs::path& file) {
+  const ReplayResult r = replay(SessionReader(file), bar(), {}, {});
+  EXPECT_EQ(r.difference, "");
+  return r.identical && r.complete;
+}
+
+struct Playbacks : testing::Test {
+  test::ScratchFolder at;
+  fs::path expert = at / "expert.oss";
+  std::string bone = record(groove(), expert);
+};
+
+TEST_F(Playbacks, HandsOfThreeStiffnessesFollowWithinAMillimetre) {
+  for (const PlaybackMode mode : {PlaybackMode::show, PlaybackMode::guide}) {
+    for (const double stiffness : {100.0, 250.0, 500.0}) {
+      PlaybackParams params;
+      params.mode = mode;
+      const fs::path file = at / ("led" + std::to_string(static_cast<int>(mode)) + std::to_string(stiffness) + ".oss");
+      const Played p = play(expert, params, stiffness, file);
+      EXPECT_TRUE(p.playback->over);
+      EXPECT_GT(p.facts.ticks, 2500U);
+      EXPECT_LT(p.facts.rms_mm, 1);
+      EXPECT_LE(p.facts.most_pull_n, params.most_n + 8);
+      EXPECT_LT(p.facts.most_work_mj, 8);    // what it takes to carry the hand along, and no more: twice as much would be swinging
+      EXPECT_EQ(p.summary.bone_hash, bone);  // to the bit, though another hand was there
+      EXPECT_TRUE(replays(file));
+    }
+  }
+}
+
+TEST_F(Playbacks, TimeAlongTheWayWaitsAndBoneIsStillTheRecordedOne) {
+  PlaybackParams params;
+  params.mode = PlaybackMode::show;
+  params.pace = Pace::way;
+  params.leash_mm = 0.6;  // a firm hand is behind farther than that
+  const fs::path file = at / "way.oss";
+  const Played p = play(expert, params, 500, file);
+  EXPECT_TRUE(p.playback->over);
+  EXPECT_GT(p.summary.ticks, 2700U + p.playback->begun) << "it never waited";
+  EXPECT_EQ(p.summary.bone_hash, bone);
+  EXPECT_TRUE(replays(file));
+}
+
+TEST_F(Playbacks, TheLearnersBurrDrillsWhereItIsToAndTheRecordedHandIsAShadow) {
+  PlaybackParams params;
+  params.mode = PlaybackMode::fading;
+  params.trial_s = 0.5;
+  params.dead_zone_mm = 0.1;
+  const fs::path file = at / "fading.oss";
+  const Played p = play(expert, params, 100, file);
+  EXPECT_GT(p.playback->fading.trials(), 3);
+  EXPECT_LT(p.playback->fading.strength(), 1);
+  EXPECT_GT(p.summary.removed_mm3, 0.1);  // by the learner's burr: the recorded one meets nothing
+  const Session session = read_session(file);
+  for (const TickRecord& r : session.ticks) {
+    if (r.hand == 1) ASSERT_EQ(r.voxels_changed, 0U);
+  }
+  EXPECT_TRUE(replays(file));
+}
+
+TEST_F(Playbacks, FeelingAloneLeadsNobodyAndBoneIsTheRecordedOne) {
+  PlaybackParams params;
+  params.mode = PlaybackMode::feel;
+  const fs::path file = at / "feel.oss";
+  const Played p = play(expert, params, 100, file, {0, 0, 20});
+  EXPECT_EQ(p.summary.bone_hash, bone);
+  EXPECT_EQ(p.facts.work_mj, 0);
+  EXPECT_EQ(p.facts.guided_s, 0);
+  EXPECT_TRUE(replays(file));
+}
+
+TEST_F(Playbacks, OneWhoDoesNotComeOnEndsItWhereItWasToldTo) {
+  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), PlaybackParams{});
+  playback->patience_s = 0.5;
+  class Rock final : public Device {
+    DeviceSample read(std::uint64_t, double, Vec3) noexcept override {
+      DeviceSample s;
+      s.position_mm = {0, 0, 60};
+      return s;
+    }
+    [[nodiscard]] bool active(std::uint64_t) const noexcept override { return false; }
+  };
+  RehearsalOptions o;
+  auto devices = playback_devices(std::make_unique<Rock>(), playback, o.haptics);
+  o.actions = playback_actions(*playback);
+  Rehearsal r(bar(), std::move(devices), o, {});
+  EXPECT_NEAR(static_cast<double>(r.run_to_end({}).ticks), 501, 2);
+  EXPECT_TRUE(playback->given_up);
+}
+
+// The pull is let go, and the hand rests: no energy is left in it.
+TEST_F(Playbacks, AHandThatIsLetGoComesToRest) {
+  PlaybackParams params;
+  params.ramp_s = 0.2;
+  auto playback = std::make_shared<Playback>(std::make_shared<Lesson>(read_lesson(SessionReader(expert), 0, 0)), params);
+  RehearsalOptions o;
+  auto hand = std::make_unique<FollowingHand>(100, Vec3{-6, 0, 8}, playback);
+  FollowingHand* const held = hand.get();
+  auto devices = playback_devices(std::move(hand), playback, o.haptics);
+  std::vector<Device*> all;
+  for (auto& d : devices) all.push_back(d.get());
+  Stream stream;
+  Operation operation(bar(), o.haptics, {}, all, stream, 1000);
+  operation.act(playback_actions(*playback).front());
+  double pulled = 0;
+  for (int t = 0; t < 2500; ++t) {
+    if (t == 1000) playback->on = false;
+    operation.step(0);
+    if (t == 900) pulled = playback->pulled;
+  }
+  EXPECT_EQ(pulled, 1);
+  EXPECT_EQ(playback->pulled, 0);
+  EXPECT_LT(length(held->velocity_mm_s()), 0.5);
+}
+
+TEST_F(Playbacks, WhatHandsDoNotRepeatIsRefusedAndSaysWhen) {
+  const auto refused = [&](const fs::path& file, double from, double to) -> std::string {
+    try {
+      static_cast<void>(read_lesson(SessionReader(file), from, to));
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refused(expert, 0, 0), "");
+  EXPECT_EQ(refused(expert, 1, 2), "");
+  EXPECT_NE(refused(expert, 10, 0).find("nothing from 10 s"), std::string::npos);
+  SceneAction move = SceneAction::move(0, {{}, {0, 0, 0.5}});
+  move.tick = 1000;
+  record(groove(), at / "moved.oss", {move});
+  EXPECT_NE(refused(at / "moved.oss", 0, 0).find("at 1 s the session has 'move'"), std::string::npos);
+  EXPECT_EQ(refused(at / "moved.oss", 0, 0.9), "");
+  EXPECT_EQ(refused(at / "moved.oss", 1.1, 0), "");
+  // A guided session is none to be led by: whose hand would it be?
+  play(expert, {}, 100, at / "led.oss");
+  EXPECT_NE(refused(at / "led.oss", 0, 0).find("'guide'"), std::string::npos);
+}
+
+TEST_F(Playbacks, SettingsOfTheSessionAreInForceWhereTheLessonBegins) {
+  SceneAction soft = SceneAction::setting(static_cast<std::uint32_t>(setting_number("stiffness_n_per_mm")), 1.25);
+  soft.tick = 500;
+  record(groove(), at / "set.oss", {soft});
+  EXPECT_EQ(read_lesson(SessionReader(at / "set.oss"), 1, 0).setup.params.contact.stiffness_n_per_mm, 1.25);
+  const Lesson whole = read_lesson(SessionReader(at / "set.oss"), 0, 0);
+  ASSERT_EQ(whole.actions.size(), 1U);
+  EXPECT_THROW(static_cast<void>(playback_actions(Playback(std::make_shared<Lesson>(whole), {}))), Error);
+  PlaybackParams feel;
+  feel.mode = PlaybackMode::feel;
+  EXPECT_EQ(playback_actions(Playback(std::make_shared<Lesson>(whole), feel)).size(), 2U);
+}
+
+Lesson straight(double mm_per_s, double seconds) {
+  Lesson lesson;
+  lesson.hands.resize(1);
+  for (int t = 0; t < seconds * 1000; ++t) {
+    DeviceSample s;
+    s.position_mm = to_floats({mm_per_s * t / 1000, 0, 0});
+    lesson.hands[0].push_back(s);
+  }
+  lesson.way = way_of(lesson.hands[0]);
+  return lesson;
+}
+
+TEST(LessonClock, GoesWithTheHandWaitsAndGoesBack) {
+  const Lesson lesson = straight(10, 4);
+  EXPECT_NEAR(static_cast<double>(lesson.way.back().arc_mm), 40, 0.3);
+  PlaybackParams params;
+  params.mode = PlaybackMode::guide;
+  params.pace = Pace::way;
+  LessonClock clock(lesson, params);
+  int ticks = 0;
+  Vec3 hand{-6, 0, 0};
+  // The target comes to the hand, and leads it to the beginning.
+  for (; !clock.started() && ticks < 1000; ++ticks) {
+    clock.step(hand, 1e-3);
+    EXPECT_LT(length(clock.target_mm() - hand), 3);
+    hand = hand * 0.99 + clock.target_mm() * 0.01;
+  }
+  EXPECT_TRUE(clock.started());
+  // With the hand at its side it goes at its own pace.
+  for (int t = 0; t < 1000; ++t) clock.step(clock.target_mm(), 1e-3);
+  EXPECT_EQ(clock.sample(), 1000U);
+  // The hand stays: a leash on, time waits.
+  hand = clock.target_mm();
+  for (int t = 0; t < 1000; ++t) clock.step(hand, 1e-3);
+  EXPECT_NEAR(clock.target_mm().x - hand.x, params.leash_mm, 0.05);
+  EXPECT_FALSE(clock.goes_on());
+  // It goes back six millimetres: so does time, to two leashes.
+  hand.x -= 6;
+  for (int t = 0; t < 2000; ++t) clock.step(hand, 1e-3);
+  EXPECT_NEAR(clock.target_mm().x - hand.x, 2 * params.leash_mm, 0.25);
+  EXPECT_FALSE(clock.goes_on());
+  // And on again: what was there before is not new.
+  int again = 0, fresh = 0;
+  for (int t = 0; t < 6000 && !clock.ended(); ++t) {
+    clock.step(clock.target_mm(), 1e-3);
+    (clock.goes_on() ? fresh : again) += 1;
+  }
+  EXPECT_TRUE(clock.ended());
+  EXPECT_NEAR(fresh, 2800, 30);
+  EXPECT_GT(again, 300);
+}
+
+TEST(LessonClock, ByTheClockItWaitsForNobody) {
+  const Lesson lesson = straight(10, 1);
+  PlaybackParams feel;
+  feel.mode = PlaybackMode::feel;
+  LessonClock clock(lesson, feel);
+  for (int t = 0; t < 1000; ++t) {
+    clock.step({100, 0, 0}, 1e-3);
+    ASSERT_EQ(clock.sample(), static_cast<std::size_t>(t));
+    ASSERT_TRUE(clock.goes_on());
+  }
+  clock.step({100, 0, 0}, 1e-3);
+  EXPECT_TRUE(clock.ended());
+}
+
+TEST(FadingGuide, ForgetsWithoutErrorsAndComesBackWithThem) {
+  FadingGuide g(0.85, 1);
+  EXPECT_EQ(g.strength(), 1);
+  const auto trial = [&](double mm) {
+    for (int i = 0; i < 1000; ++i) g.add(mm * i / 900);
+    g.end_trial();
+  };
+  double before = 1;
+  for (int i = 0; i < 30; ++i) {
+    trial(0.8);  // in the dead zone: nothing but forgetting
+    EXPECT_NEAR(g.strength(), 0.85 * before, 1e-9);
+    before = g.strength();
+  }
+  EXPECT_LT(g.strength(), 0.01);
+  for (int i = 0; i < 60; ++i) trial(FadingGuide::kWorstMm);
+  EXPECT_NEAR(g.last_error_mm(), FadingGuide::kWorstMm, 0.06);
+  EXPECT_NEAR(g.strength(), 1, 0.02);
+  // Halfway errors ask for half of it.
+  for (int i = 0; i < 80; ++i) trial(3);
+  EXPECT_NEAR(g.strength(), 0.5, 0.02);
+  g.add(NAN);
+  g.end_trial();
+  EXPECT_LE(g.strength(), 1);
+}
+
+TEST(Spread, IsTheDistanceOfWays) {
+  const Lesson a = straight(10, 2);
+  Lesson b = a;
+  for (auto& p : b.way) p.at_mm[1] = 1.5F;
+  EXPECT_EQ(spread_mm(a, {}), 0);
+  const Lesson others[] = {b};
+  EXPECT_NEAR(spread_mm(a, others), 1.5, 0.02);
+}
+
+}  // namespace
+}  // namespace osteo
