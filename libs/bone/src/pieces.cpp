@@ -152,7 +152,8 @@ Split split_bone(const BrickGrid& bone, const LiveComponents& components, double
     }
   }
   for (const auto& [key, p] : apart) {
-    if (p == kCrumb) continue;
+    // A brick that is one piece's after all is shared with the bone, which others are reading: nothing is written there, not even the same.
+    if (p == kCrumb || around[key / BrickGrid::kVoxels] == p) continue;
     const Ijk c = bone.coordinate(key);
     BrickGrid& to = split.pieces[p].bone;
     to.set(p == 0 ? key : to.find(c.i, c.j, c.k), bone.value(key));
