@@ -114,7 +114,8 @@ int run_participant(const fs::path& folder, const ExperimentCommand::Params& p, 
   std::size_t seen = 0;
   const std::size_t done =
       simulate_participant(folder, protocol, who, p.retention, p.null ? null_model() : ParticipantModel{}, io.context, [&] {
-        io.context.progress(static_cast<double>(++seen) / static_cast<double>(all),
+        ++seen;
+        io.context.progress(static_cast<double>(seen) / static_cast<double>(all),
                             p.participant + ", trial " + std::to_string(seen) + " of " + std::to_string(all));
       });
   io.end_progress();

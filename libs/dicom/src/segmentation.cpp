@@ -395,8 +395,8 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
       out[p] = static_cast<std::uint8_t>(number);
     };
     if (pixels == nullptr || pixel_bytes * (bits ? 8 : 1) < (i + 1) * area) throw fail("frame " + std::to_string(i + 1) + " is cut short");
-    for (std::size_t p = 0, at = i * area; p < area; ++p, ++at) {
-      if (bits ? (pixels[at / 8] >> (at % 8) & 1) != 0 : pixels[at] >= half) mark(p);
+    for (std::size_t p = 0, bit = i * area; p < area; ++p, ++bit) {
+      if (bits ? (pixels[bit / 8] >> (bit % 8) & 1) != 0 : pixels[bit] >= half) mark(p);
     }
   }
   if (overlap > 0) context.warn(std::to_string(overlap) + " voxels belong to several segments; the last one keeps them");

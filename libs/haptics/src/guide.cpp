@@ -61,7 +61,7 @@ Vec3 GuideLaw::step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Ve
   } else {
     pull += rate_ * (guide_.damping_n_s_per_m / 1000) - speed_ * (guide_.brake_n_s_per_m / 1000);
   }
-  const double strength = static_cast<double>(leader.buttons & kLeadStrength) / kLeadStrength;
+  const double strength = static_cast<double>(leader.buttons & kLeadStrength) / double{kLeadStrength};
   const double most = away ? std::min(guide_.most_n, kAwayN) : guide_.most_n;
   if (const double n = length(pull); n > most) pull = pull * (most / n);
   Vec3 force = (pull + leader_force_n * (guide_.forward * share_)) * strength;

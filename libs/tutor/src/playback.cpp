@@ -159,7 +159,7 @@ DeviceSample RecordedDevice::read(std::uint64_t tick, double dt_s, Vec3) noexcep
   if (hand_ == 0 && !p.clock.started()) sample.position_mm = to_floats(p.clock.target_mm());
   const bool drills = expert_drills(p.params);
   if (!drills) sample.pedal = 0;
-  const int strength = hand_ == 0 ? static_cast<int>(std::lround(p.strength * kLeadStrength)) : 0;
+  const int strength = hand_ == 0 ? static_cast<int>(std::lround(p.strength * double{kLeadStrength})) : 0;
   const int still = drills && p.clock.goes_on() ? 0 : kLeadStill;
   sample.buttons = static_cast<std::uint8_t>(strength | still);
   return sample;

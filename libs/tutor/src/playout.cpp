@@ -88,7 +88,7 @@ DeviceSample Playout::read(std::uint64_t now, bool pulls) noexcept {
   if (silent > kSilenceTicks) strength_ = std::min(strength_, std::max(0.0, 1 - static_cast<double>(silent - kSilenceTicks) / kFadeTicks));
   DeviceSample s = held_;
   s.age_ms = static_cast<std::uint8_t>(std::min<std::uint64_t>(silent > kSilenceTicks ? silent : 0, 255));
-  s.buttons = static_cast<std::uint8_t>(std::lround(strength_ * kLeadStrength));
+  s.buttons = static_cast<std::uint8_t>(std::lround(strength_ * double{kLeadStrength}));
   return s;
 }
 
@@ -98,7 +98,7 @@ DeviceSample FarDevice::read(std::uint64_t tick, double, Vec3) noexcept {
   for (std::size_t i = 0; i < n; ++i) playout_.put(items[i].sample, tick, items[i].newest);
   const DeviceSample s = playout_.read(tick, pulls());
   shown_.store(s);
-  strength_.store(static_cast<double>(s.buttons & kLeadStrength) / kLeadStrength, std::memory_order_relaxed);
+  strength_.store(static_cast<double>(s.buttons & kLeadStrength) / double{kLeadStrength}, std::memory_order_relaxed);
   buffer_.store(playout_.buffer_ticks(), std::memory_order_relaxed);
   return s;
 }

@@ -248,9 +248,9 @@ std::string EditControl::readout() const {
   if (!under_mouse_) return {};
   const Image& ct = document_.ct();
   std::string text = place_text(*under_mouse_) + " mm";
-  const auto hu = hu_at(ct, *under_mouse_);
-  if (!hu) return text + "   outside the scan";
-  text += "   " + std::to_string(std::lround(*hu)) + " HU";
+  const auto here = hu_at(ct, *under_mouse_);
+  if (!here) return text + "   outside the scan";
+  text += "   " + std::to_string(std::lround(*here)) + " HU";
   const Vec3 x = ct.frame.index_from_world(*under_mouse_);
   std::array<int, 3> at{};
   for (std::size_t a = 0; a < 3; ++a) at[a] = std::clamp(static_cast<int>(std::floor(x[a] + 0.5)), 0, ct.frame.dims[a] - 1);

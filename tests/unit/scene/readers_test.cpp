@@ -220,7 +220,9 @@ TEST(Readers, ALittleAtATimeIsTheSame) {
   parts.add(by_and_by, false);
   std::uint64_t t = 0;
   for (; t < 700 && device.active(t); ++t) {
-    if (t % 50 == 10) ASSERT_TRUE(operation.act(SceneAction::suction({0, 0, double(t)}, 5, 200), [](const World::Effect&) {}).done);
+    if (t % 50 == 10) {
+      ASSERT_TRUE(operation.act(SceneAction::suction({0, 0, double(t)}, 5, 200), [](const World::Effect&) {}).done);
+    }
     operation.step(0);
   }
   const std::size_t taken = parts.drain(0);

@@ -22,7 +22,9 @@ TEST(ToolShape, BallsFillEachHeadFromEndToEnd) {
       // On the axis, and as large as fits: to a cone's slope, which a ball inside touches beside its middle.
       Vec3 outwards;
       EXPECT_LE(shape.distance_mm(balls[b].centre_mm, outwards), -0.9 * balls[b].radius_mm) << burr.name();
-      if (b > 0) EXPECT_LE(length(balls[b].centre_mm - balls[b - 1].centre_mm), apart) << burr.name();
+      if (b > 0) {
+        EXPECT_LE(length(balls[b].centre_mm - balls[b - 1].centre_mm), apart) << burr.name();
+      }
     }
   }
 }

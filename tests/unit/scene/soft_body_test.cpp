@@ -76,7 +76,9 @@ TEST(SoftBody, PushesBackAndIsReplayedToTheBit) {
     EXPECT_GT(most, 0.05) << by_the_clock;
     EXPECT_LT(sideways, 0.3 * most);
     EXPECT_LT(last, 1e-3);
-    if (!by_the_clock) EXPECT_LT(jump, 0.3);
+    if (!by_the_clock) {
+      EXPECT_LT(jump, 0.3);
+    }
     const ReplayResult again = replay(SessionReader(file), start.copy(), {}, {});
     EXPECT_TRUE(again.identical) << again.difference;
     // Dented while pressed, back again now.
@@ -116,7 +118,9 @@ TEST(SoftBody, ATurningBurrCutsVoxelsOff) {
     const TriMesh& drawn = o.soft->drawn();
     EXPECT_NE(drawn.triangles.size(), triangles);
     const MeshCheck closed = check(drawn);
-    if (!with_skin) EXPECT_EQ(closed.open_edges, 0u);
+    if (!with_skin) {
+      EXPECT_EQ(closed.open_edges, 0u);
+    }
     for (const auto& t : drawn.triangles)
       for (const std::uint32_t p : t) ASSERT_LT(p, drawn.points_mm.size());
     before[with_skin] = volume_mm3(rest);

@@ -205,7 +205,9 @@ TEST(Factorised, CutsAndHeldTissueAndNonsense) {
   }
   for (std::size_t p = 0; p < x.size(); ++p) {
     ASSERT_TRUE(std::isfinite(x[p].x + x[p].y + x[p].z));
-    if (there[p]) EXPECT_LT(length(x[p] - pad.b.points[p]), 0.05);
+    if (there[p]) {
+      EXPECT_LT(length(x[p] - pad.b.points[p]), 0.05);
+    }
   }
   EXPECT_THROW(pad.with(0), Error);
   EXPECT_THROW(pad.with(3, -1), Error);

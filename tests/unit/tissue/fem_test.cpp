@@ -203,7 +203,9 @@ TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
       (stress(t, stretch).second > 0 ? hi : lo) = t;
     }
     const double traction = stress(lo, stretch).first;
-    if (law == ElasticLaw::neo_hooke_split) EXPECT_NEAR(traction, 0.03451610, 1e-8);  // as CalculiX prints it
+    if (law == ElasticLaw::neo_hooke_split) {
+      EXPECT_NEAR(traction, 0.03451610, 1e-8);  // as CalculiX prints it
+    }
     for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
       const FemBody body(b.points, b.tets, {m}, law, order);
       TissueLoad load;

@@ -115,7 +115,9 @@ TEST_F(Playbacks, TheLearnersBurrDrillsWhereItIsToAndTheRecordedHandIsAShadow) {
   EXPECT_GT(p.summary.removed_mm3, 0.1);  // by the learner's burr: the recorded one meets nothing
   const Session session = read_session(file);
   for (const TickRecord& r : session.ticks) {
-    if (r.hand == 1) ASSERT_EQ(r.voxels_changed, 0U);
+    if (r.hand == 1) {
+      ASSERT_EQ(r.voxels_changed, 0U);
+    }
   }
   EXPECT_TRUE(replays(file));
 }

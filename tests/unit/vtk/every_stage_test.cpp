@@ -167,7 +167,9 @@ void expect_equal(const Data& wanted, vtkDataObject* object) {
     EXPECT_TRUE(std::ranges::equal(got.points_mm, (*tets)->points_mm));
     EXPECT_TRUE(std::ranges::equal(got.tets, (*tets)->tets));
   } else if (std::holds_alternative<std::monostate>(wanted)) {
-    if (auto* const empty = vtkImageData::SafeDownCast(object)) EXPECT_EQ(empty->GetNumberOfPoints(), 0);
+    if (auto* const empty = vtkImageData::SafeDownCast(object)) {
+      EXPECT_EQ(empty->GetNumberOfPoints(), 0);
+    }
   } else {
     auto* const own = vtkOsteoDataObject::SafeDownCast(object);
     ASSERT_NE(own, nullptr);
@@ -177,8 +179,12 @@ void expect_equal(const Data& wanted, vtkDataObject* object) {
       EXPECT_EQ(got.frame, grid->frame);
       EXPECT_EQ(got.active_voxels, grid->active_voxels);
     }
-    if (const auto* d = std::get_if<Document>(&wanted)) EXPECT_EQ(std::get<Document>(own->GetValue()).json, d->json);
-    if (const auto* p = std::get_if<Picture>(&wanted)) EXPECT_EQ(std::get<Picture>(own->GetValue()).rgb, p->rgb);
+    if (const auto* d = std::get_if<Document>(&wanted)) {
+      EXPECT_EQ(std::get<Document>(own->GetValue()).json, d->json);
+    }
+    if (const auto* p = std::get_if<Picture>(&wanted)) {
+      EXPECT_EQ(std::get<Picture>(own->GetValue()).rgb, p->rgb);
+    }
   }
 }
 

@@ -48,7 +48,9 @@ TEST(Keys, HelpNamesTheKeysThemselves) {
       const bool letter = k.code >= 'A' && k.code <= 'Z';
       const bool told = std::find(line.commands.begin(), line.commands.end(), k.command) != line.commands.end();
       const std::string name = std::string(k.with == kWithCtrl ? "Ctrl-" : k.with == kWithAlt ? "Alt-" : "") + static_cast<char>(k.code);
-      if (letter) EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, told) << line.keys;
+      if (letter) {
+        EXPECT_EQ(keys.find(" " + name + ",") != std::string::npos, told) << line.keys;
+      }
     }
   }
 }

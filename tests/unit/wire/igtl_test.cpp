@@ -64,7 +64,9 @@ TEST(Igtl, WhatIsWrittenIsReadAsItWas) {
           EXPECT_EQ(m.time_s, 0.25);
           EXPECT_TRUE(is_rigid(*p));
         }
-        if (m.type == "SENSOR") EXPECT_EQ(igtl_sensor_in(m), (std::vector<double>{1.5, -2.25, 0}));
+        if (m.type == "SENSOR") {
+          EXPECT_EQ(igtl_sensor_in(m), (std::vector<double>{1.5, -2.25, 0}));
+        }
         if (m.type == "NDARRAY") {
           const auto s = igtl_samples_in(m);
           ASSERT_TRUE(s);
@@ -72,7 +74,9 @@ TEST(Igtl, WhatIsWrittenIsReadAsItWas) {
           EXPECT_EQ(s->values, samples);
           EXPECT_EQ(std::llround(m.time_s * 30000), 149);
         }
-        if (m.type == "STRING") EXPECT_EQ(igtl_string_in(m), "{\"event\":\"train\"}");
+        if (m.type == "STRING") {
+          EXPECT_EQ(igtl_string_in(m), "{\"event\":\"train\"}");
+        }
       }));
     }
     EXPECT_EQ(seen, 5) << piece;
@@ -187,7 +191,9 @@ TEST(Igtl, WhateverComesIsTakenOrLeft) {
         static_cast<void>(igtl_pose_in(m));
         static_cast<void>(igtl_sensor_in(m));
         static_cast<void>(igtl_string_in(m));
-        if (const auto s = igtl_samples_in(m)) EXPECT_EQ(s->values.size() * 2 + 6, m.content.size());
+        if (const auto s = igtl_samples_in(m)) {
+          EXPECT_EQ(s->values.size() * 2 + 6, m.content.size());
+        }
       });
       at += n;
     }
