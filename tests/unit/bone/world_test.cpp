@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <malloc.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <numbers>
@@ -113,6 +115,32 @@ TEST(World, ActionsCopyOnlyTheBricksThatTheyChangeAndNeverWriteOldOnes) {
   EXPECT_EQ(shared_bricks(copy.bodies()[0].body->bone, w.bodies()[0].body->bone), 0u);
   ASSERT_TRUE(w.act(SceneAction::plain(ActionKind::undo)).done);
   EXPECT_EQ(w.bodies()[0].body->bone.hash(), was);
+}
+
+// The servo and others read the bone that is there by plain loads meanwhile: even a value that was there already may not be written again.
+TEST(World, ActionsWriteNothingWhereOthersRead) {
+  World w(bar(0.25, 0.4));
+  const auto old = w.bodies()[0].body;  // keeps the block that all its bricks were made in
+  const float* const first = old->bone.values_of_brick(0);
+  const float* const end = old->bone.values_of_brick(static_cast<std::uint32_t>(old->bone.brick_count()) - 1) + BrickGrid::kVoxels;
+  ASSERT_EQ(end - first, static_cast<std::ptrdiff_t>(old->bone.brick_count() * BrickGrid::kVoxels));
+  const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const std::uintptr_t from = (reinterpret_cast<std::uintptr_t>(first) + page - 1) / page * page;
+  const std::uintptr_t to = reinterpret_cast<std::uintptr_t>(end) / page * page;
+  ASSERT_GT(to - from, 100 * page);
+  ASSERT_EQ(::mprotect(reinterpret_cast<void*>(from), to - from, PROT_READ), 0);
+  // Kerfs as narrow as that leave bricks near both parts which are one part's after all.
+  const SceneAction did[] = {SceneAction::saw({{2, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.6}),
+                             SceneAction::split(1),
+                             SceneAction::plain(ActionKind::undo),
+                             SceneAction::split(1),
+                             SceneAction::saw({{-4, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.6}),
+                             SceneAction::split(1)};
+  for (const SceneAction& a : did) EXPECT_TRUE(w.act(a).done) << name_of(a);
+  while (w.act(SceneAction::plain(ActionKind::undo)).done) {
+  }
+  ASSERT_EQ(::mprotect(reinterpret_cast<void*>(from), to - from, PROT_READ | PROT_WRITE), 0);
+  EXPECT_EQ(w.hash(), World(bar(0.25, 0.4)).hash());
 }
 
 TEST(World, MovesOfDifferentPiecesAreTakenBackOneByOne) {
