@@ -16,10 +16,10 @@ _osteo() {
     "voxelize --margin") COMPREPLY=($(compgen -W "exact thesis " -- "$cur")); return ;;
     "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
     "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
-    "fem --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split " -- "$cur")); return ;;
-    "fem --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
-    "calibrate --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split " -- "$cur")); return ;;
-    "calibrate --order") COMPREPLY=($(compgen -W "auto t4 t10 " -- "$cur")); return ;;
+    "fem --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split corotated " -- "$cur")); return ;;
+    "fem --order") COMPREPLY=($(compgen -W "auto t4 t10 t4_mean " -- "$cur")); return ;;
+    "calibrate --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split corotated " -- "$cur")); return ;;
+    "calibrate --order") COMPREPLY=($(compgen -W "auto t4 t10 t4_mean " -- "$cur")); return ;;
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;

@@ -158,7 +158,7 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   }
   const Elements elements = elements_for(p.law, p.order, problem, mesh);
   const auto body = [&](TetOrder order) { return FemBody(points, tets, problem.materials, elements.law, order); };
-  const FemBody true_body = body(elements.order), other_body = body(elements.order == TetOrder::t4 ? TetOrder::t10 : TetOrder::t4);
+  const FemBody true_body = body(elements.order), other_body = body(elements.order == TetOrder::t10 ? TetOrder::t4 : TetOrder::t10);
   Truth true_statics(true_body, true_body.on_all_points(problem.loads.front())),
       other_statics(other_body, other_body.on_all_points(problem.loads.front()));
   // The truth, and how far it may be off itself: the other order on the same mesh.

@@ -23,7 +23,8 @@ StageInfo FemStage::info() {
           .description =
               "Static equilibrium of tetrahedra under dead loads: Newton's method with exact Hessians and sparse Cholesky. Linear "
               "elasticity, Saint "
-              "Venant-Kirchhoff or neo-Hookean; linear or quadratic tetrahedra; a material for each region. Agrees with CalculiX to 1e-6 "
+              "Venant-Kirchhoff, neo-Hookean or corotated; linear or quadratic tetrahedra, or linear ones that do not lock near "
+              "incompressibility; a material for each region. Agrees with CalculiX to 1e-6 "
               "where that "
               "has the same law. Reads and writes input files of CalculiX and Abaqus: give one .inp as mesh and as problem.",
           .inputs = {{"mesh", {DataKind::tets}, "the body at rest, as tetrahedralize makes it, or .inp"},
@@ -31,7 +32,10 @@ StageInfo FemStage::info() {
           .outputs =
               {{"deformed", {DataKind::tets}, "the same mesh under the load"},
                {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
-               {"inp", {DataKind::document}, "the problem for CalculiX or Abaqus (not neo_hooke, no contacts)", true},
+               {"inp",
+                {DataKind::document},
+                "the problem for CalculiX or Abaqus (not neo_hooke, corotated or t4_mean, which are not known there, and no contacts)",
+                true},
                {"nodes", {DataKind::document}, "all nodes in double precision, middles of edges too, with displacement_mm (.vtu)", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.3",
                          "J. Bonet, R. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2008"},
@@ -50,26 +54,41 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   if (!r.converged) throw not_at_rest(r, "let the load grow in more --load-steps, or make it smaller");
   const std::span<const Vec3> corners(r.points_mm.data(), mesh.points_mm.size());
   const Json moved = displacement({body.rest().data(), corners.size()}, corners);
-  const Json j{{"load", problem.load_names[n]},
-               {"law", name_of(elements.law)},
-               {"order", name_of(elements.order)},
-               {"order_because", elements.because},
-               {"points", body.point_count()},
-               {"displacement", moved},
-               {"energy_mj", r.energy_mj},
-               {"reaction_n", {r.reaction_n.x, r.reaction_n.y, r.reaction_n.z}},
-               {"contact_n", {r.contact_n.x, r.contact_n.y, r.contact_n.z}},
-               {"points_in_contact", r.touching},
-               {"iterations", r.iterations},
-               {"factorisations", r.factorisations},
-               {"factorisations_shifted", r.shifted},
-               {"residual", r.residual},
-               {"inverted_tetrahedra", body.inverted(r.points_mm)}};
+  Json j{{"load", problem.load_names[n]},
+         {"law", name_of(elements.law)},
+         {"order", name_of(elements.order)},
+         {"order_because", elements.because},
+         {"points", body.point_count()},
+         {"displacement", moved},
+         {"energy_mj", r.energy_mj},
+         {"reaction_n", {r.reaction_n.x, r.reaction_n.y, r.reaction_n.z}},
+         {"contact_n", {r.contact_n.x, r.contact_n.y, r.contact_n.z}},
+         {"points_in_contact", r.touching},
+         {"iterations", r.iterations},
+         {"factorisations", r.factorisations},
+         {"factorisations_shifted", r.shifted},
+         {"residual", r.residual},
+         {"inverted_tetrahedra", body.inverted(r.points_mm)}};
+  if (elements.order == TetOrder::t4_mean) {
+    std::size_t of_few = 0;
+    for (std::size_t q = 0; q < body.patch_count(); ++q) of_few += body.patch(q).size() < 4 ? 1 : 0;
+    j["patches"] = body.patch_count();
+    j["patches_of_fewer_than_four"] = of_few;
+  }
   for (const auto& [key, value] : moved.members()) context.report(key, *value.number());
   context.report("iterations", static_cast<std::int64_t>(r.iterations));
   context.progress(1);
   Document inp;
-  if (elements.law != ElasticLaw::neo_hooke && load.contacts.empty()) inp.json = inp_text(body, load);
+  const bool known = elements.law != ElasticLaw::neo_hooke && elements.law != ElasticLaw::corotated && elements.order != TetOrder::t4_mean;
+  if (known && load.contacts.empty()) {
+    inp.json = inp_text(body, load);
+  } else {
+    // Whoever asked for the file finds in it why it holds no problem.
+    inp.json = "** osteotome wrote no problem: CalculiX and Abaqus know no " +
+               (known ? std::string("contact with rigid things as it is here")
+                      : std::string(name_of(elements.law)) + " with " + std::string(name_of(elements.order))) +
+               "; give --law linear, stvk or neo_hooke_split, --order t4 or t10, and a load without contacts\n";
+  }
   return {moved_mesh(mesh, corners), Document{written(j)}, std::move(inp), Document{nodes_vtu(body, r.points_mm)}};
 }
 

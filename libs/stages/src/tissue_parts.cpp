@@ -17,13 +17,16 @@ constexpr double kSafePoisson = 0.4;       // above, linear elements lock
 
 Elements elements_for(LawChoice law, OrderChoice order, const TissueProblem& problem, const TetMesh& mesh) {
   Elements t{law == LawChoice::automatic ? problem.law.value_or(ElasticLaw::neo_hooke) : static_cast<ElasticLaw>(static_cast<int>(law) - 1),
-             order == OrderChoice::t4 ? TetOrder::t4 : TetOrder::t10, "asked for"};
+             order == OrderChoice::t4        ? TetOrder::t4
+             : order == OrderChoice::t4_mean ? TetOrder::t4_mean
+                                             : TetOrder::t10,
+             "asked for"};
   if (order != OrderChoice::automatic) return t;
   double poisson = 0;
   for (const Material& m : problem.materials) poisson = std::max(poisson, m.poisson);
   if (problem.order) {
     t.order = *problem.order;
-    t.because = "as in the .inp file";
+    t.because = "as the problem says";
     if (t.order == TetOrder::t4 && poisson > kSafePoisson)
       t.because += "; linear tetrahedra lock at a Poisson's ratio of " + format_number(poisson);
   } else if (mesh.tets.size() > kManyTets && poisson <= kSafePoisson) {
@@ -41,7 +44,7 @@ std::string_view name_of(ElasticLaw law) {
   return EnumNames<LawChoice>::values[static_cast<std::size_t>(law) + 1];
 }
 std::string_view name_of(TetOrder order) {
-  return order == TetOrder::t4 ? "t4" : "t10";
+  return order == TetOrder::t4 ? "t4" : order == TetOrder::t4_mean ? "t4_mean" : "t10";
 }
 
 std::size_t load_named(const TissueProblem& problem, const std::string& name) {

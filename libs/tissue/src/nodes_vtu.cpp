@@ -26,7 +26,7 @@ std::string three(Vec3 v) {
 }  // namespace
 
 std::string nodes_vtu(const FemBody& body, std::span<const Vec3> x) {
-  const std::size_t nodes = body.point_count(), cells = body.element_count(), per = body.order() == TetOrder::t4 ? 4 : 10;
+  const std::size_t nodes = body.point_count(), cells = body.tet_count(), per = body.order() == TetOrder::t10 ? 10 : 4;
   Text t;
   t.line("<?xml version=\"1.0\"?>");
   t.line("<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>");

@@ -31,7 +31,9 @@ class ProblemReader {
   TissueProblem read(bool needs_loads) {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_tissue");
-    file_.allow(root, "", Names{"osteotome_tissue", "$schema", "about", "material", "regions", "fixed", "loads"});
+    file_.allow(root, "", Names{"osteotome_tissue", "$schema", "about", "law", "order", "material", "regions", "fixed", "loads"});
+    problem_.law = named<ElasticLaw>(root, "law", {"linear", "stvk", "neo_hooke", "neo_hooke_split", "corotated"});
+    problem_.order = named<TetOrder>(root, "order", {"t4", "t10", "t4_mean"});
     const JsonValue& general = file_.need(root, "", "material");
     file_.allow(general, "material", Names{"young_kpa", "poisson", "density_kg_m3", "about"});
     problem_.general = material_of(file_, general, "material");
@@ -47,6 +49,19 @@ class ProblemReader {
   }
 
  private:
+  // One of the names, in the order of the enum's values.
+  template <class E>
+  [[nodiscard]] std::optional<E> named(const JsonValue& object, const std::string& key, const Names& names) const {
+    const JsonValue* const found = object.find(key);
+    if (found == nullptr) return std::nullopt;
+    const std::string& name = file_.text(*found, "\"" + key + "\"");
+    std::string all;
+    for (std::size_t n = 0; n < names.size(); ++n) {
+      if (names[n] == name) return static_cast<E>(n);
+      all += (n > 0 ? ", " : "") + names[n];
+    }
+    throw file_.wrong(*found, "\"" + key + "\" is one of " + all + ", not '" + name + "'");
+  }
   [[nodiscard]] const std::vector<JsonValue>& items(const JsonValue& object, const std::string& key, bool needed) const {
     static const std::vector<JsonValue> none;
     const JsonValue* const found = needed ? &file_.need(object, "", key) : object.find(key);

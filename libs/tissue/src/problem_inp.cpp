@@ -323,6 +323,11 @@ std::string field(double v) {
 }  // namespace
 
 std::string inp_text(const FemBody& body, const TissueLoad& load) {
+  if (body.law() == ElasticLaw::corotated)
+    throw Error(ExitCode::usage, "the corotated law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
+  if (body.order() == TetOrder::t4_mean)
+    throw Error(ExitCode::usage, "tetrahedra with the mean change of volume of a patch have no counterpart in CalculiX or Abaqus",
+                "write t4 or t10");
   if (body.law() == ElasticLaw::neo_hooke)
     throw Error(ExitCode::usage, "this neo-Hookean law has no counterpart in CalculiX or Abaqus", "write linear, stvk or neo_hooke_split");
   std::string t = "** written by osteotome: mm, N, MPa\n*NODE, NSET=ALL\n";

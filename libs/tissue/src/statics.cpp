@@ -16,7 +16,7 @@ class Touching final : public Energy {
     // Corners of faces that one tetrahedron has, and what lies between two of them.
     std::vector<std::array<std::uint32_t, 3>> faces;
     constexpr std::size_t kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-    for (std::size_t e = 0; e < body.element_count(); ++e) {
+    for (std::size_t e = 0; e < body.tet_count(); ++e) {
       const auto n = body.nodes(e);
       for (const auto& f : kFaces) {
         faces.push_back({n[f[0]], n[f[1]], n[f[2]]});
@@ -39,7 +39,7 @@ class Touching final : public Energy {
       if (on[p]) surface_.push_back(p);
     }
     constexpr std::size_t kEnds[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};  // of C3D10
-    for (std::size_t e = 0; e < body.element_count() && body.order() == TetOrder::t10; ++e) {
+    for (std::size_t e = 0; e < body.tet_count() && body.order() == TetOrder::t10; ++e) {
       const auto n = body.nodes(e);
       for (std::size_t k = 0; k < 6; ++k) {
         const std::array<std::uint32_t, 2> edge{std::min(n[kEnds[k][0]], n[kEnds[k][1]]), std::max(n[kEnds[k][0]], n[kEnds[k][1]])};
@@ -98,7 +98,7 @@ Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOp
       for (std::size_t a = 0; a < 3; ++a) start[m.point][a] += (m.held >> a & 1) != 0 ? m.by_mm[a] : 0;
     }
     std::vector<std::array<std::uint32_t, 4>> tets;
-    for (std::size_t e = 0; e < body.element_count(); ++e)
+    for (std::size_t e = 0; e < body.tet_count(); ++e)
       tets.push_back({body.nodes(e)[0], body.nodes(e)[1], body.nodes(e)[2], body.nodes(e)[3]});
     const FemBody small({rest.data(), body.corner_count()}, tets, body.materials(), ElasticLaw::linear, body.order());
     const Equilibrium r = EquilibriumSolver(small, rest, load).solve(small, start, {}, {}, context);

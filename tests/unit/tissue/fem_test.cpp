@@ -24,7 +24,9 @@ namespace {
 using test::block;
 using test::shaken;
 
-constexpr ElasticLaw kLaws[] = {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split};
+constexpr ElasticLaw kLaws[] = {ElasticLaw::linear, ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split,
+                                ElasticLaw::corotated};
+constexpr TetOrder kOrders[] = {TetOrder::t4, TetOrder::t10, TetOrder::t4_mean};
 
 std::vector<std::uint32_t> where(const std::vector<Vec3>& points, const std::function<bool(Vec3)>& f) {
   std::vector<std::uint32_t> found;
@@ -37,7 +39,7 @@ std::vector<std::uint32_t> where(const std::vector<Vec3>& points, const std::fun
 TEST(Fem, GradientsAndHessiansAreThoseOfTheEnergy) {
   const auto b = block(1, 1, 1, 2.0);
   for (const ElasticLaw law : kLaws) {
-    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+    for (const TetOrder order : kOrders) {
       const FemBody body(b.points, b.tets, {{0.3, 0.4}}, law, order);
       test::expect_exact_derivatives(body, shaken(body.rest(), 0.15, 3));
     }
@@ -56,7 +58,7 @@ TEST(Fem, PatchTest) {
   }
   const auto map = [](Vec3 p) { return p + Vec3{0.01 * p.x + 0.02 * p.y, -0.015 * p.y + 0.005 * p.z, 0.008 * p.z + 0.01 * p.x}; };
   for (const ElasticLaw law : kLaws) {
-    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+    for (const TetOrder order : kOrders) {
       const FemBody body(points, b.tets, {{1.0, 0.3}}, law, order);
       const auto fixed = body.with_middles(where(points, [&](Vec3 p) { return !inside(p); }));
       std::vector<bool> held(body.point_count());
@@ -146,8 +148,8 @@ TEST(Fem, CantileverConverges) {
 TEST(Fem, ARigidMotionCostsNothing) {
   const auto b = block(2, 2, 2, 1.0);
   const double c = std::cos(1.1), s = std::sin(1.1);
-  for (const ElasticLaw law : {ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split}) {
-    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+  for (const ElasticLaw law : {ElasticLaw::stvk, ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split, ElasticLaw::corotated}) {
+    for (const TetOrder order : kOrders) {
       const FemBody body(b.points, b.tets, {{1, 0.49}}, law, order);
       auto x = body.rest();
       for (Vec3& p : x) p = {c * p.x - s * p.y + 5, s * p.x + c * p.y - 7, p.z + 1};
@@ -182,7 +184,7 @@ TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
   const Material m{0.1, 0.45};
   const double mu = m.shear_mpa(), lambda = m.lambda_mpa(), bulk = m.bulk_mpa(), stretch = 1.5;
   const auto b = block(2, 2, 3, 1.0);
-  for (const ElasticLaw law : {ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split, ElasticLaw::stvk}) {
+  for (const ElasticLaw law : {ElasticLaw::neo_hooke, ElasticLaw::neo_hooke_split, ElasticLaw::stvk, ElasticLaw::corotated}) {
     // First Piola stresses along and across, for a lateral stretch t.
     const auto stress = [&](double t, double s) {
       const double j = s * t * t;
@@ -193,6 +195,10 @@ TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
       if (law == ElasticLaw::stvk) {
         const double along = (s * s - 1) / 2, across = (t * t - 1) / 2, trace = along + 2 * across;
         return std::pair{s * (lambda * trace + 2 * mu * along), t * (lambda * trace + 2 * mu * across)};
+      }
+      if (law == ElasticLaw::corotated) {
+        const double trace = s + 2 * t - 3;
+        return std::pair{2 * mu * (s - 1) + lambda * trace, 2 * mu * (t - 1) + lambda * trace};
       }
       const double shape = mu / std::cbrt(j * j), third = (s * s + 2 * t * t) / 3, volume = bulk * (j - 1) * j;
       return std::pair{(shape * (s * s - third) + volume) / s, (shape * (t * t - third) + volume) / t};
@@ -206,7 +212,7 @@ TEST(Fem, SlidersAndTractionsGiveTheLawItself) {
     if (law == ElasticLaw::neo_hooke_split) {
       EXPECT_NEAR(traction, 0.03451610, 1e-8);  // as CalculiX prints it
     }
-    for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+    for (const TetOrder order : kOrders) {
       const FemBody body(b.points, b.tets, {m}, law, order);
       TissueLoad load;
       for (std::uint32_t p = 0; p < b.points.size(); ++p) {
@@ -310,6 +316,191 @@ TEST(Fem, LamesTube) {
     EXPECT_LT(error[1][0], error[0][0]);
     EXPECT_GT(error[1][0], 3 * error[1][1]);
   }
+}
+
+// Lame's tube again, all but incompressible: linear tetrahedra lock, with the mean over patches they do not.
+TEST(Fem, MeanVolumesDoNotLock) {
+  constexpr double kNu = 0.4999;
+  double error[3][2];
+  for (const int fine : {0, 1}) {
+    const int n = fine == 0 ? 4 : 8;
+    const auto m = test::mapped(n, 2 * n, 1, [&](Vec3 u) {
+      const double r = 1 + u.x, a = u.y * std::acos(-1.0) / 2;
+      return Vec3{u.y == 1 ? 0 : r * std::cos(a), r * std::sin(a), 1.0 / n * u.z};
+    });
+    for (const TetOrder order : kOrders) {
+      const FemBody body(m.b.points, m.b.tets, {{1, kNu}}, ElasticLaw::linear, order);
+      TissueLoad load = test::held(m, [](Vec3 u) { return 4 | (u.y == 0 ? 2 : 0) | (u.y == 1 ? 1 : 0); });
+      load_faces(
+          m, [](Vec3 u) { return u.x == 0; }, [](Vec3 area) { return area * -0.01; }, load);
+      const TissueLoad all = body.on_all_points(load);
+      const Equilibrium r = EquilibriumSolver(body, body.rest(), all).solve(body, body.rest(), all.forces_n);
+      ASSERT_TRUE(r.converged) << r.why;
+      double off = 0, size = 0;
+      for (std::size_t p = 0; p < m.from.size(); ++p) {
+        const Vec3 q = body.rest()[p];
+        const double radius = std::hypot(q.x, q.y), u = (1 + kNu) * 0.01 / 3 * ((1 - 2 * kNu) * radius + 4 / radius);
+        const Vec3 own = r.points_mm[p] - q, wrong = Vec3{q.x, q.y, 0} * (u / radius) - own;
+        off += dot(wrong, wrong);
+        size += u * u;
+      }
+      error[static_cast<int>(order)][fine] = std::sqrt(off / size);
+    }
+  }
+  std::printf("Lame's tube, nu 0.4999, relative error: t4 %.4f, %.4f (halved), t10 %.5f, %.5f, t4_mean %.5f, %.5f\n", error[0][0],
+              error[0][1], error[1][0], error[1][1], error[2][0], error[2][1]);
+  EXPECT_LT(error[2][0], 0.15 * error[0][0]);
+  EXPECT_LT(error[2][1], 0.25 * error[0][1]);
+  EXPECT_LT(error[2][1], 0.3 * error[2][0]);  // second order
+}
+
+// Patches are a partition: each tetrahedron in one, of one material, joined by faces, and few are small.
+TEST(Fem, PatchesOfMeanVolumes) {
+  const auto b = block(5, 4, 3, 1.0, [](Vec3 p) { return !(p.x > 2 && p.y > 2 && p.z > 1); });
+  std::vector<Material> materials;
+  for (const auto& t : b.tets) materials.push_back({b.points[t[0]].z < 1.5 ? 1.0 : 2.0, 0.499});
+  const FemBody body(b.points, b.tets, materials, ElasticLaw::neo_hooke, TetOrder::t4_mean);
+  std::vector<int> seen(b.tets.size());
+  std::size_t small = 0;
+  for (std::size_t p = 0; p < body.patch_count(); ++p) {
+    const auto& patch = body.patch(p);
+    small += patch.size() < 4 ? 1 : 0;
+    std::vector<std::uint32_t> joined{patch.front()};
+    for (std::size_t k = 0; k < joined.size(); ++k) {
+      for (const std::uint32_t other : patch) {
+        int common = 0;
+        for (const std::uint32_t a : b.tets[joined[k]])
+          common += static_cast<int>(std::count(b.tets[other].begin(), b.tets[other].end(), a));
+        if (common == 3 && std::find(joined.begin(), joined.end(), other) == joined.end()) joined.push_back(other);
+      }
+    }
+    EXPECT_EQ(joined.size(), patch.size());
+    for (const std::uint32_t t : patch) {
+      ++seen[t];
+      EXPECT_EQ(materials[t].young_mpa, materials[patch.front()].young_mpa);
+    }
+    EXPECT_LE(body.nodes(b.tets.size() + p).size(), Energy::kMostNodes);
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), static_cast<std::ptrdiff_t>(b.tets.size()));
+  EXPECT_LE(small * 20, body.patch_count());
+  EXPECT_LT(body.patch_count() * 6, b.tets.size());
+}
+
+// One tetrahedron; a layer of slivers a thousandth as high as wide: at rest, and forces sum to zero.
+TEST(Fem, MeanVolumesOfHardMeshes) {
+  const FemBody one(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, std::vector<std::array<std::uint32_t, 4>>{{0, 1, 2, 3}},
+                    {{1, 0.4999}}, ElasticLaw::neo_hooke, TetOrder::t4_mean);
+  const FemBody alone(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                      std::vector<std::array<std::uint32_t, 4>>{{0, 1, 2, 3}}, {{1, 0.4999}}, ElasticLaw::neo_hooke, TetOrder::t4);
+  const auto moved = shaken(one.rest(), 0.1, 11);
+  EXPECT_NEAR(total_energy(one, moved), total_energy(alone, moved), 1e-12 * total_energy(alone, moved));
+  const auto m = test::mapped(6, 6, 1, [](Vec3 u) { return Vec3{u.x, u.y, 0.001 * u.z}; });
+  for (const ElasticLaw law : kLaws) {
+    const FemBody body(m.b.points, m.b.tets, {{1, 0.4999}}, law, TetOrder::t4_mean);
+    TissueLoad load = test::held(m, [](Vec3 u) { return (u.x == 0 ? 1 : 0) | (u.y == 0 ? 2 : 0) | (u.z == 0 ? 4 : 0); });
+    load_faces(
+        m, [](Vec3 u) { return u.x == 1; }, [](Vec3 area) { return area * 0.05; }, load);
+    const TissueLoad all = body.on_all_points(load);
+    const Equilibrium r = EquilibriumSolver(body, body.rest(), all).solve(body, body.rest(), all.forces_n, {1e-10, 100, 2});
+    EXPECT_TRUE(r.converged) << r.why;
+    EXPECT_EQ(body.inverted(r.points_mm), 0u);
+    std::vector<Vec3> g(body.point_count());
+    total_gradient(body, r.points_mm, g);
+    Vec3 sum{};
+    for (const Vec3 f : g) sum += f;
+    EXPECT_LT(length(sum), 1e-12);
+  }
+}
+
+std::vector<Vec3> mapped_by(const std::vector<Vec3>& x, const double (&f)[3][3]) {
+  std::vector<Vec3> y = x;
+  for (std::size_t p = 0; p < x.size(); ++p) {
+    for (std::size_t i = 0; i < 3; ++i) y[p][i] = f[i][0] * x[p].x + f[i][1] * x[p].y + f[i][2] * x[p].z;
+  }
+  return y;
+}
+
+// The corotated law is Hooke's for small strains, to third order of the energy, however the body has turned.
+TEST(Fem, CorotatedIsLinearForSmallStrains) {
+  const auto b = block(2, 2, 2, 1.0);
+  const FemBody corotated(b.points, b.tets, {{1, 0.4}}, ElasticLaw::corotated, TetOrder::t4),
+      linear(b.points, b.tets, {{1, 0.4}}, ElasticLaw::linear, TetOrder::t4);
+  const double c = std::cos(2.2), s = std::sin(2.2);
+  double off[2];
+  for (const int k : {0, 1}) {
+    const double e = k == 0 ? 1e-3 : 5e-4;
+    // Symmetric, so that the linear law sees no rotation.
+    const double strain[3][3] = {{1 + e, 0.3 * e, 0.2 * e}, {0.3 * e, 1 - 0.7 * e, -0.4 * e}, {0.2 * e, -0.4 * e, 1 + 0.5 * e}};
+    const double turn[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
+    const auto strained = mapped_by(b.points, strain);
+    const double straight = total_energy(linear, strained);
+    off[k] = std::abs(total_energy(corotated, mapped_by(strained, turn)) / straight - 1);
+    EXPECT_LT(off[k], 1e-9);  // of a symmetric strain they agree to rounding
+    const FemBody stvk(b.points, b.tets, {{1, 0.4}}, ElasticLaw::stvk, TetOrder::t4);
+    EXPECT_NEAR(total_energy(stvk, strained) / straight, 1, 3 * e);
+  }
+}
+
+// Inside out it has an energy and pushes back: one tetrahedron mirrored, and a body whose points are shaken through each other, come to
+// rest as they were.
+TEST(Fem, CorotatedComesBackFromInsideOut) {
+  const std::vector<std::array<std::uint32_t, 4>> only{{0, 1, 2, 3}};
+  const FemBody one(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, only, {{1, 0.4}}, ElasticLaw::corotated, TetOrder::t4);
+  const std::vector<std::uint32_t> base{0, 1, 2};
+  auto mirrored = one.rest();
+  mirrored[3] = {0.1, 0.05, -0.8};
+  EXPECT_EQ(one.inverted(mirrored), 1u);
+  const Equilibrium back = EquilibriumSolver(one, one.rest(), base).solve(one, mirrored, {});
+  ASSERT_TRUE(back.converged) << back.why;
+  EXPECT_LT(length(back.points_mm[3] - one.rest()[3]), 1e-8);
+  const auto b = block(2, 2, 2, 1.0);
+  for (const TetOrder order : kOrders) {
+    const FemBody body(b.points, b.tets, {{1, 0.4}}, ElasticLaw::corotated, order);
+    // Exact derivatives where it is inverted too, off the places where the rotation jumps.
+    const double inverted[3][3] = {{1.1, 0.1, 0}, {0, 0.9, 0.2}, {0.1, 0, -0.4}};
+    test::expect_exact_derivatives(body, shaken(mapped_by(body.rest(), inverted), 0.02, 5));
+    const auto fixed = body.with_middles(where(b.points, [](Vec3 p) { return p.z < 0.1; }));
+    std::vector<Vec3> start = shaken(body.rest(), 0.7, 9);
+    for (const std::uint32_t p : fixed) start[p] = body.rest()[p];
+    EXPECT_GT(body.inverted(start), b.tets.size() / 10);
+    const Equilibrium r = EquilibriumSolver(body, body.rest(), fixed).solve(body, start, {}, {1e-10, 300, 1});
+    ASSERT_TRUE(r.converged) << r.why;
+    double far = 0;
+    for (std::size_t p = 0; p < body.point_count(); ++p) far = std::max(far, length(r.points_mm[p] - body.rest()[p]));
+    EXPECT_LT(far, 1e-6) << static_cast<int>(order) << ", inverted at first " << body.inverted(start);
+  }
+}
+
+// Cook's membrane in plane strain, all but incompressible: the middle of its right edge rises by 16.45 (16.442 as many authors print it;
+// quadratic triangles with linear pressures, 64 along, extrapolated: 16.452).
+TEST(Fem, CooksMembraneNearlyIncompressible) {
+  double rise[3][2];
+  for (const int fine : {0, 1}) {
+    const int n = fine == 0 ? 8 : 16;
+    const auto m = test::mapped(n, n, 1, [n](Vec3 u) { return Vec3{48 * u.x, 44 * u.x + (44 - 28 * u.x) * u.y, 48.0 / n * u.z}; });
+    for (const TetOrder order : kOrders) {
+      const FemBody body(m.b.points, m.b.tets, {{1.12499998125, 0.499999975}}, ElasticLaw::linear, order);
+      TissueLoad load = test::held(m, [](Vec3 u) { return (u.x == 0 ? 3 : 0) | 4; });
+      load_faces(
+          m, [](Vec3 u) { return u.x == 1; },
+          [](Vec3 area) {
+            return Vec3{0, length(area) / 16, 0};
+          },
+          load);
+      const TissueLoad all = body.on_all_points(load);
+      const Equilibrium r = EquilibriumSolver(body, body.rest(), all).solve(body, body.rest(), all.forces_n);
+      ASSERT_TRUE(r.converged) << r.why;
+      for (std::size_t p = 0; p < m.from.size(); ++p) {
+        if (m.from[p].x == 1 && m.from[p].y == 0.5 && m.from[p].z == 0)
+          rise[static_cast<int>(order)][fine] = r.points_mm[p].y - body.rest()[p].y;
+      }
+    }
+  }
+  std::printf("Cook's membrane, nu 0.499999975, rise: t4 %.3f, %.3f (halved), t10 %.3f, %.3f, t4_mean %.3f, %.3f; 16.45 expected\n",
+              rise[0][0], rise[0][1], rise[1][0], rise[1][1], rise[2][0], rise[2][1]);
+  EXPECT_LT(rise[0][1], 0.7 * 16.45);
+  EXPECT_NEAR(rise[2][1], 16.45, 0.05 * 16.45);
+  EXPECT_LT(std::abs(rise[2][1] - 16.45), std::abs(rise[2][0] - 16.45));
 }
 
 // Displacements that CalculiX finds for the same file.

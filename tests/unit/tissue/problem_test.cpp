@@ -109,6 +109,34 @@ TEST(TissueProblem, FactorsOfAGridAreAppliedAsTheyWereFitted) {
   EXPECT_THROW(with_log_factors(model, {2, 2, 2}, std::vector<double>(5)), Error);
 }
 
+// Which elements: by name, as the flags say it; what is not known is told with its line.
+TEST(TissueProblem, NamesItsLawAndItsElements) {
+  const TetMesh mesh = mesh_of(test::block(2, 1, 1, 5.0));
+  const auto problem = [&](const std::string& keys) {
+    return parse_tissue_problem("{\"osteotome_tissue\": 1,\n" + keys + R"( "material": {"young_kpa": 100, "poisson": 0.4999},
+      "fixed": [{"box_mm": [[-1, -1, -1], [0.1, 11, 11]]}]})",
+                                mesh, false);
+  };
+  EXPECT_FALSE(problem("").law.has_value() || problem("").order.has_value());
+  const TissueProblem p = problem(R"("law": "corotated", "order": "t4_mean",)");
+  EXPECT_EQ(p.law, ElasticLaw::corotated);
+  EXPECT_EQ(p.order, TetOrder::t4_mean);
+  EXPECT_EQ(problem(R"("order": "t10",)").order, TetOrder::t10);
+  for (const std::string& wrong : {std::string(R"("order": "t5",)"), std::string(R"("law": "hooke",)"), std::string(R"("order": 4,)")}) {
+    try {
+      static_cast<void>(problem(wrong));
+      ADD_FAILURE() << wrong;
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find("line 2"), std::string::npos) << e.what();
+    }
+  }
+  // Neither has a counterpart in an .inp file.
+  for (const auto& [law, order] : {std::pair{ElasticLaw::corotated, TetOrder::t4}, {ElasticLaw::linear, TetOrder::t4_mean}}) {
+    const FemBody body(points_of(mesh), tets_of(mesh), p.materials, law, order);
+    EXPECT_THROW(static_cast<void>(inp_text(body, {})), Error);
+  }
+}
+
 // Written and read back as .inp: the same body under the same load, forces on faces and sliders too.
 TEST(TissueProblem, GoesThroughAnInpFile) {
   const TetMesh mesh = mesh_of(test::block(4, 2, 2, 5.0));

@@ -10,15 +10,15 @@
 namespace osteo {
 
 /// ElasticLaw, and to choose none.
-enum class LawChoice : int { automatic, linear, stvk, neo_hooke, neo_hooke_split };
+enum class LawChoice : int { automatic, linear, stvk, neo_hooke, neo_hooke_split, corotated };
 template <>
 struct EnumNames<LawChoice> {
-  static constexpr std::array<std::string_view, 5> values{"auto", "linear", "stvk", "neo_hooke", "neo_hooke_split"};
+  static constexpr std::array<std::string_view, 6> values{"auto", "linear", "stvk", "neo_hooke", "neo_hooke_split", "corotated"};
 };
-enum class OrderChoice : int { automatic, t4, t10 };
+enum class OrderChoice : int { automatic, t4, t10, t4_mean };
 template <>
 struct EnumNames<OrderChoice> {
-  static constexpr std::array<std::string_view, 3> values{"auto", "t4", "t10"};
+  static constexpr std::array<std::string_view, 4> values{"auto", "t4", "t10", "t4_mean"};
 };
 
 struct FemParams {
@@ -33,12 +33,14 @@ struct FemStage {
   static void describe(Params& p, auto& visit) {
     visit({"law",
            "linear: small strains; stvk: Hooke's law in Green's strain; neo_hooke: large strains; neo_hooke_split: shape and volume apart, "
-           "as "
-           "CalculiX has it; auto: neo_hooke, or what an .inp says"},
+           "as CalculiX has it; corotated: Hooke's law seen from where each element has turned to, finite for what is inside out; "
+           "auto: neo_hooke, or what the problem says"},
           p.law);
-    visit(
-        {"order", "t4: linear tetrahedra; t10: quadratic; auto: quadratic, but for large meshes whose Poisson's ratio lets linear ones do"},
-        p.order);
+    visit({"order",
+           "t4: linear tetrahedra; t10: quadratic; t4_mean: linear ones whose change of volume is the mean of a patch, for Poisson's "
+           "ratios near a half; "
+           "auto: what the problem says, else quadratic, but for large meshes whose Poisson's ratio lets linear ones do"},
+          p.order);
     visit({"load", "name of the load (empty: the first)"}, p.load);
     visit({"load_steps", "equal steps in which the load grows", "", 1, 1000}, p.load_steps);
     visit({"tolerance", "residual force over load", "", 1e-14, 1e-2}, p.tolerance);

@@ -12,7 +12,7 @@ namespace osteo {
 /// immutable as far as threads see them.
 class Energy {
  public:
-  static constexpr std::size_t kMostNodes = 10;
+  static constexpr std::size_t kMostNodes = 16;
 
   virtual ~Energy() = default;
   [[nodiscard]] virtual std::size_t point_count() const = 0;

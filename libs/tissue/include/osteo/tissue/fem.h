@@ -20,11 +20,17 @@ struct Material {
 
 /// linear: small strain. stvk: Saint Venant-Kirchhoff, Green's strain in Hooke's law (what programs mean by large displacement with elastic
 /// constants). neo_hooke: W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2. neo_hooke_split: W = mu/2 (J^(-2/3) tr C - 3) +
-/// K/2 (J - 1)^2, shape apart from volume, as *HYPERELASTIC, NEO HOOKE has it. Both infinite where J <= 0.
-enum class ElasticLaw : int { linear, stvk, neo_hooke, neo_hooke_split };
+/// K/2 (J - 1)^2, shape apart from volume, as *HYPERELASTIC, NEO HOOKE has it. Both infinite where J <= 0. corotated: W = mu |F - R|^2 +
+/// lambda/2 (tr(R^T F) - 3)^2, R the rotation (never a mirroring) nearest to F: Hooke's law seen from where the element has turned to,
+/// finite for any F, so that what is inside out is pushed back. Its Hessian is exact but where the two smaller singular values, signed, add
+/// up to less than 1e-3: there R jumps, and the Hessian is that of 1e-3.
+enum class ElasticLaw : int { linear, stvk, neo_hooke, neo_hooke_split, corotated };
 /// t4: linear tetrahedra; too stiff in bending, and lock as Poisson's ratio nears a half. t10: quadratic, straight edges at rest, 4 Gauss
-/// points.
-enum class TetOrder : int { t4, t10 };
+/// points. t4_mean: linear ones in patches of about eight; the part of the law that Poisson's ratio makes stiff (the term of lambda; of
+/// neo_hooke_split that of K) acts on the change of volume averaged over a patch, the rest on each tetrahedron. Bends like t4, does not
+/// lock. An energy like the others, so forces balance and the Hessian is symmetric (T. Hughes 1980 for the mean; patches of simplices:
+/// E. de Souza Neto et al., Int. J. Numer. Meth. Eng. 62, 2005, there without an energy).
+enum class TetOrder : int { t4, t10, t4_mean };
 
 /// A body of tetrahedra with one material a tetrahedron. Points are mm at rest; of t10 the corners come first, as in the mesh.
 class FemBody final : public Energy {
@@ -36,8 +42,12 @@ class FemBody final : public Energy {
           ElasticLaw law, TetOrder order);
 
   [[nodiscard]] std::size_t point_count() const override { return rest_.size(); }
-  [[nodiscard]] std::size_t element_count() const override { return count_; }
-  [[nodiscard]] std::span<const std::uint32_t> nodes(std::size_t e) const override { return {nodes_.data() + e * per_, per_}; }
+  /// The tetrahedra, then of t4_mean the patches.
+  [[nodiscard]] std::size_t element_count() const override { return count_ + patches_.size(); }
+  [[nodiscard]] std::size_t tet_count() const { return count_; }
+  [[nodiscard]] std::span<const std::uint32_t> nodes(std::size_t e) const override {
+    return e < count_ ? std::span(nodes_.data() + e * per_, per_) : std::span<const std::uint32_t>(patches_[e - count_].nodes);
+  }
   double element(std::size_t e, const Vec3* x, double* gradient, double* hessian) const override;
 
   [[nodiscard]] const std::vector<Vec3>& rest() const { return rest_; }
@@ -51,13 +61,24 @@ class FemBody final : public Energy {
   [[nodiscard]] std::size_t inverted(std::span<const Vec3> x) const;
   [[nodiscard]] const std::vector<Material>& materials() const { return materials_; }
   [[nodiscard]] ElasticLaw law() const { return law_; }
-  [[nodiscard]] TetOrder order() const { return per_ == 4 ? TetOrder::t4 : TetOrder::t10; }
+  [[nodiscard]] TetOrder order() const { return order_; }
+  /// Of t4_mean: the tetrahedra of each patch, all of one material, joined by faces. Each tetrahedron is in one; those that no neighbour of
+  /// their material could take are patches of fewer than four, and as stiff as t4.
+  [[nodiscard]] std::size_t patch_count() const { return patches_.size(); }
+  [[nodiscard]] const std::vector<std::uint32_t>& patch(std::size_t p) const { return patches_[p].tets; }
 
  private:
   struct Gauss {
-    std::array<Vec3, kMostNodes> gradient;  // of the shape functions, 1/mm
+    std::array<Vec3, 10> gradient;  // of the shape functions, 1/mm
     double weight_mm3;
   };
+  struct Patch {
+    std::vector<std::uint32_t> tets, nodes;
+    std::vector<std::array<std::uint8_t, 4>> local;  // of each tetrahedron: its corners among `nodes`
+    double mm3 = 0;
+  };
+  void make_patches();
+  double patch_element(const Patch& patch, const Vec3* x, double* gradient, double* hessian) const;
   [[nodiscard]] const Material& material(std::size_t e) const { return materials_[materials_.size() == 1 ? 0 : e]; }
 
   std::vector<Vec3> rest_;
@@ -68,6 +89,8 @@ class FemBody final : public Energy {
   std::size_t gauss_per_;
   std::vector<Material> materials_;
   ElasticLaw law_;
+  TetOrder order_;
+  std::vector<Patch> patches_;
 };
 
 /// Points in mm and tetrahedra of a mesh, for both models.

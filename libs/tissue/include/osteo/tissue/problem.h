@@ -16,7 +16,8 @@ namespace osteo {
 ///   "fixed": [ {"box_mm": [[-1,-1,-1],[100,100,0.1]]}, {"box_mm": [[-1,-1,-1],[0.1,100,100]], "axes": "x"} ],
 ///   "loads": [ {"name": "pull", "forces": [ {"at_mm": [5,5,10], "radius_mm": 3, "total_n": [0,0,1]} ],
 ///                               "surfaces": [ {"box_mm": [[0,0,9.9],[10,10,10.1]], "kpa": 2} ]} ] }
-/// docs/tissue-problem.md has every key with its unit; a load may also have
+/// docs/tissue-problem.md has every key with its unit; beside these "law" and "order" may choose the elements by their names, and a load
+/// may also have
 ///   "volumes": [{place, "total_n": [0,0,1]}], "gravity_m_s2": [0,0,-9.81] (with "density_kg_m3" in the material),
 ///   "moved": [{place, "by_mm": [0,0,-1], "axes": "z"}],
 ///   "contacts": [{"at_mm": [0,0,0], "normal": [0,0,1] (or "radius_mm"), "stiffness_n_per_mm": 10}].
@@ -37,15 +38,15 @@ struct TissueProblem {
   std::vector<Slider> sliders;
   std::vector<std::string> load_names;
   std::vector<TissueLoad> loads;  ///< each with `fixed` and `sliders`, and what it holds or moves besides
-  std::optional<ElasticLaw> law;  ///< what an .inp says; JSON leaves it open
-  std::optional<TetOrder> order;
+  std::optional<ElasticLaw> law;  ///< what an .inp says, and JSON may
+  std::optional<TetOrder> order;  ///< so too
 };
 /// Errors: usage with the line and the place in the text; for places that no point lies in; for a load on fixed points alone.
 /// Without `needs_loads` there may be none.
 [[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true);
 /// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and
-/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Error(usage) for neo_hooke, which is not known
-/// there.
+/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Error(usage) for neo_hooke, corotated and
+/// t4_mean, which are not known there.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 /// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
 /// Constants that were learnt without the regions ("base") stand on one material.
