@@ -74,7 +74,8 @@ found = run(python, "-m", "mypy", "--strict", "wrong.py", ok=False).stdout
 for number, (line, kind) in enumerate(wrong.items(), 2):
     assert any(f"wrong.py:{number}: error" in f and f"[{kind}]" in f for f in found.splitlines()), f"mypy takes {line}\n{found}"
 # Names, parameters and their order in the types are those of the module.
-(out / "allowed").write_text("osteo.Error.*\nosteo.__all__\nosteo._.*\n")
+# Classes of pybind11 have a metaclass of its own, and those that cannot be made a constructor that says so.
+(out / "allowed").write_text("osteo\\._.*\nosteo\\.Error.*\nosteo\\.(Field|Grid|Image|Labels|Surface|Tets)\nosteo\\.Tets\\.__init__\n")
 told = run(python, "-m", "mypy.stubtest", "osteo", "--allowlist", out / "allowed", "--ignore-unused-allowlist", "--concise", ok=False)
 assert told.returncode == 0, told.stdout + told.stderr
 print(f"pip install from a clone, {said}; types agree with the module")
