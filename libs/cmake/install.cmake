@@ -35,6 +35,7 @@ foreach(name ${OSTEO_COMPONENTS})
 endforeach()
 set(config ${CMAKE_INSTALL_LIBDIR}/cmake/osteo)
 install(EXPORT osteoTargets NAMESPACE osteo:: DESTINATION ${config} COMPONENT dev)
+export(EXPORT osteoTargets NAMESPACE osteo:: FILE ${CMAKE_BINARY_DIR}/osteoTargets.cmake)  # for OSTEO_BUILT
 configure_package_config_file(libs/cmake/osteoConfig.cmake.in ${CMAKE_BINARY_DIR}/osteoConfig.cmake INSTALL_DESTINATION ${config})
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/osteoConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/osteoConfig.cmake ${CMAKE_BINARY_DIR}/osteoConfigVersion.cmake libs/cmake/dependencies.cmake

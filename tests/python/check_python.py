@@ -92,3 +92,59 @@ assert surface.triangles.max() == len(surface.points_mm) - 1
 edges = np.sort(np.concatenate([surface.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]), axis=1)
 assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all(), "the surface is closed"
 print(f"phantom: {bone.active_voxels} voxels, {len(surface.triangles)} triangles")
+
+# A surface of one's own, and what is wrong with others.
+copy = osteo.Surface(surface.points_mm, surface.triangles, surface.normals)
+assert np.array_equal(copy.points_mm, surface.points_mm) and np.array_equal(copy.triangles, surface.triangles)
+fails(lambda: osteo.Surface(surface.points_mm[:3].copy(), surface.triangles), 2, "names point")
+fails(lambda: osteo.Surface(surface.points_mm.astype(float), surface.triangles), 2, "float32")
+fails(lambda: osteo.Surface(surface.points_mm, surface.triangles, surface.normals[:2].copy()), 2, "normals")
+assert osteo.__version__.count(".") == 2
+
+# VTK's own module, where it is.
+try:
+    from vtkmodules.util import numpy_support
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+except ImportError:
+    print("VTK's module for Python is not installed: nothing is shared with it")
+    sys.exit(0)
+
+
+def address(array):
+    return numpy_support.vtk_to_numpy(array).ctypes.data
+
+
+turned = osteo.Image(voxels, spacing_mm=(0.5, 0.6, 0.7), origin_mm=(1, 2, 3), direction=((0, -1, 0), (1, 0, 0), (0, 0, 1)))
+image = osteo.to_vtk(turned)
+assert address(image.GetPointData().GetScalars()) == voxels.ctypes.data, "shared"
+assert image.GetDimensions() == (28, 24, 20) and image.GetScalarComponentAsDouble(7, 6, 5, 0) == 1200
+place = [0.0, 0.0, 0.0]
+image.TransformIndexToPhysicalPoint([1, 0, 0], place)
+assert place == [1.0, 2.5, 3.0], place
+back = osteo.from_vtk(image)
+assert isinstance(back, osteo.Image) and back.voxels.ctypes.data == voxels.ctypes.data
+assert (back.spacing_mm, back.origin_mm, back.direction) == (turned.spacing_mm, turned.origin_mm, turned.direction)
+image.SetExtent(2, 29, 0, 23, 0, 19)
+assert osteo.from_vtk(image).origin_mm == [1.0, 3.0, 3.0]
+poly = osteo.to_vtk(surface)
+assert address(poly.GetPoints().GetData()) == surface.points_mm.ctypes.data
+assert address(poly.GetPolys().GetConnectivityArray()) == surface.triangles.ctypes.data
+assert address(poly.GetPointData().GetNormals()) == surface.normals.ctypes.data
+points, triangles = surface.points_mm.copy(), surface.triangles.copy()
+del surface, bone
+gc.collect()
+back = osteo.from_vtk(poly)
+assert np.array_equal(back.points_mm, points) and np.array_equal(back.triangles, triangles), "the data set keeps the memory alive"
+from vtkmodules.vtkFiltersCore import vtkMassProperties
+mass = vtkMassProperties()
+mass.SetInputData(poly)
+p = points[triangles].astype(float)
+assert np.isclose(mass.GetVolume(), np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])).sum() / 6, rtol=1e-3)
+assert len(osteo.from_vtk(vtkPolyData()).triangles) == 0
+for wrong, error in ((lambda: osteo.to_vtk(3), TypeError), (lambda: osteo.from_vtk(3), TypeError)):
+    try:
+        wrong()
+    except error:
+        continue
+    raise AssertionError("taken")
+print("VTK shares voxels, points and corners")

@@ -6,11 +6,15 @@
 """
 import inspect as _inspect
 import keyword as _keyword
+import os as _os
 import warnings as _warnings
 from collections import namedtuple as _namedtuple
 
 from . import _osteo
-from ._osteo import Error, Grid, Image, Labels, Surface, Tets
+from ._osteo import Error, Field, Grid, Image, Labels, Surface, Tets, __version__
+from .rehearsals import Rehearsal, Script, action_dtype, goal_dtype, goals, load_script, tick_dtype, tools
+from .sessions import Session
+from .vtk import from_vtk, to_vtk
 
 _types = {"source": "os.PathLike | str", "image": "Image", "labels": "Labels", "grid": "Grid", "surface": "Surface", "tets": "Tets",
           "picture": "numpy.ndarray", "document": "dict"}
@@ -92,9 +96,22 @@ def _function(stage):
     return function
 
 
+def load(path, kind=""):
+    """The value in a file, by its suffix: an Image, Grid, Surface, Tets, a picture or a document. Voxels of a label map want kind="labels"."""
+    return _osteo.load(_os.fspath(path), kind)
+
+
+def save(value, path):
+    """Writes a value, or a picture (uint8, rows, columns, 3), whole or not at all; the suffix says as what."""
+    _osteo.save(value, _os.fspath(path))
+
+
 stages = []
 for _stage in _osteo.declarations():
     _f = _function(_stage)
+    if _f.__name__ in globals():
+        raise ImportError(f"stage {_stage['name']} has the name of another thing in this module")
     globals()[_f.__name__] = _f
     stages.append(_f.__name__)
-__all__ = ["Error", "Grid", "Image", "Labels", "Surface", "Tets", "stages", *stages]
+__all__ = ["Error", "Field", "Grid", "Image", "Labels", "Rehearsal", "Script", "Session", "Surface", "Tets", "action_dtype", "from_vtk", "goal_dtype", "goals",
+           "load", "load_script", "save", "stages", "tick_dtype", "to_vtk", "tools", *stages]

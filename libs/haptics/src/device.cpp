@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/base/portable_math.h"
+#include "osteo/haptics/stroke_goal.h"
 
 namespace osteo {
 namespace {
@@ -137,21 +138,23 @@ DeviceSample MouseDevice::read(std::uint64_t, double dt_s, Vec3 force_n) noexcep
   return hand_.step(held_, dt_s, force_n);
 }
 
-DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept {
-  const double t = static_cast<double>(tick) / rate_hz_;
-  const auto& w = strokes_.waypoints;
-  while (leg_ + 1 < w.size() && w[leg_ + 1].t_s <= t) ++leg_;
+HandGoal goal_at(const Strokes& strokes, double t_s, std::size_t& leg) noexcept {
+  const auto& w = strokes.waypoints;
+  while (leg + 1 < w.size() && w[leg + 1].t_s <= t_s) ++leg;
   HandGoal goal;
-  goal.tool = static_cast<std::uint8_t>(strokes_.tool);
-  goal.axis = to_floats(strokes_.axis);
-  if (w[leg_].drill_on && leg_ + 1 < w.size())
-    goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg_].pedal, 0.0, 1.0)));
-  goal.position_mm = w[leg_].at_mm;
-  if (leg_ + 1 < w.size()) {
-    const double s = std::clamp((t - w[leg_].t_s) / (w[leg_ + 1].t_s - w[leg_].t_s), 0.0, 1.0);
-    goal.position_mm += (w[leg_ + 1].at_mm - w[leg_].at_mm) * s;
+  goal.tool = static_cast<std::uint8_t>(strokes.tool);
+  goal.axis = to_floats(strokes.axis);
+  if (w[leg].drill_on && leg + 1 < w.size()) goal.pedal = static_cast<std::uint8_t>(std::lround(255 * std::clamp(w[leg].pedal, 0.0, 1.0)));
+  goal.position_mm = w[leg].at_mm;
+  if (leg + 1 < w.size()) {
+    const double s = std::clamp((t_s - w[leg].t_s) / (w[leg + 1].t_s - w[leg].t_s), 0.0, 1.0);
+    goal.position_mm += (w[leg + 1].at_mm - w[leg].at_mm) * s;
   }
-  return hand_.step(goal, dt_s, force_n);
+  return goal;
+}
+
+DeviceSample ScriptedDevice::read(std::uint64_t tick, double dt_s, Vec3 force_n) noexcept {
+  return hand_.step(goal_at(strokes_, static_cast<double>(tick) / rate_hz_, leg_), dt_s, force_n);
 }
 
 }  // namespace osteo
