@@ -27,6 +27,7 @@ _osteo() {
     "find-structures --side") COMPREPLY=($(compgen -W "left right " -- "$cur")); return ;;
     "register --method") COMPREPLY=($(compgen -W "mutual surface " -- "$cur")); return ;;
     "phantom --region") COMPREPLY=($(compgen -W "head temporal mandible " -- "$cur")); return ;;
+    "run --engine") COMPREPLY=($(compgen -W "stages vtk " -- "$cur")); return ;;
     "prepare --preset") COMPREPLY=($(compgen -W "fixed cortical cellular thin " -- "$cur")); return ;;
     "prepare --region") COMPREPLY=($(compgen -W "whole box left_temporal right_temporal jaw " -- "$cur")); return ;;
     "scene --contact") COMPREPLY=($(compgen -W "rays volume overlap proxy " -- "$cur")); return ;;
@@ -86,7 +87,7 @@ _osteo() {
     series) flags="$flags --studies --thumbnails" ;;
     guide) flags="$flags --series --hu-offset --picture" ;;
     convert) flags="$flags --source --series --onto-source --description" ;;
-    run) flags="$flags --validate --dry-run --reuse" ;;
+    run) flags="$flags --validate --dry-run --reuse --engine" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --keep-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh --no-report" ;;
     batch) flags="$flags --out --pipeline --jobs --memory-mb --minutes --retries --retry-failed --keep-free-mb --only --report-only --no-report" ;;
     report) flags="$flags --scan" ;;

@@ -6,8 +6,10 @@
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
 #include "osteo/cli/report.h"
+#include "osteo/pipeline/engine.h"
 #include "osteo/pipeline/pipeline.h"
 #include "osteo/session/script_file.h"
+#include "osteo/vtk/pipeline.h"
 
 namespace osteo {
 
@@ -54,7 +56,8 @@ int RunCommand::run(const Params& p, cli::Invocation& io) {
     }
     return 0;
   }
-  const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = p.reuse}, io.context);
+  const auto results = run_pipeline(std::move(pipeline), io.registry, {.overwrite = io.common.force, .reuse = p.reuse}, io.context,
+                                    p.engine == RunEngine::vtk ? vtk_engine(io.registry) : MakeEngine());
   io.end_progress();
   cli::print_results(results, io);
   return 0;

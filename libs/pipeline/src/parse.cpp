@@ -2,6 +2,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/json.h"
+#include "osteo/pipeline/engine.h"
 #include "osteo/pipeline/pipeline.h"
 
 namespace osteo {
@@ -51,6 +52,17 @@ class PipelineReader {
         if (other.id == node.id) throw file_.wrong(s, "stage '" + node.id + "': two stages have this id");
       }
       result.nodes.push_back(node);
+    }
+    return result;
+  }
+
+  /// By id.
+  [[nodiscard]] std::map<std::string, std::size_t> lines() const {
+    std::map<std::string, std::size_t> result;
+    for (const JsonValue& s : stages()) {
+      const std::string number = "stage " + std::to_string(result.size() + 1);
+      const bool has_id = s.kind == JsonValue::Kind::object && s.find("id") != nullptr;
+      result[has_id ? text_of(s, "id", number) : file_.text(file_.need(s, number, "stage"), number + ": \"stage\"")] = s.line;
     }
     return result;
   }
@@ -177,6 +189,10 @@ Pipeline parse_pipeline(std::string_view text, const std::map<std::string, std::
                 near.empty() ? "" : "did you mean '" + near + "'?");
   }
   return pipeline;
+}
+
+std::map<std::string, std::size_t> step_lines(std::string_view json) {
+  return PipelineReader(json).lines();
 }
 
 }  // namespace osteo

@@ -5,6 +5,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
+#include "osteo/pipeline/engine.h"
 #include "osteo/pipeline/formats.h"
 #include "osteo/pipeline/pipeline.h"
 #include "osteo/pipeline/report_json.h"
@@ -71,7 +72,7 @@ class Runner {
     results_.resize(stages_.size());
   }
 
-  std::vector<NodeResult> run() {
+  std::vector<NodeResult> run(const MakeEngine& make_engine) {
     check_inputs_exist();
     if (!options_.overwrite && !options_.reuse) refuse_to_overwrite();
     for (std::size_t n = 0; n < stages_.size(); ++n) compute_key(n);
@@ -85,6 +86,7 @@ class Runner {
       for (const auto& [port, path] : pipeline_.nodes[n].outputs) check_place(*find_port(stages_[n]->info().outputs, port), path);
     }
     for (const bool b : needed_) to_run += b ? 1 : 0;
+    if (make_engine && to_run > 0) engine_ = make_engine(pipeline_to_run());
     std::size_t done = 0;
     for (std::size_t n = 0; n < stages_.size(); ++n) {
       if (!is_needed(n)) {
@@ -182,6 +184,20 @@ class Runner {
   }
   [[nodiscard]] bool is_needed(std::size_t n) const { return n < needed_.size() && needed_[n]; }
 
+  // What is left when steps whose outputs are there become these files.
+  [[nodiscard]] Pipeline pipeline_to_run() const {
+    Pipeline part{pipeline_.name, pipeline_.description, {}};
+    for (std::size_t n = 0; n < pipeline_.nodes.size(); ++n) {
+      if (!is_needed(n)) continue;
+      part.nodes.push_back(pipeline_.nodes[n]);
+      for (auto& [port, input] : part.nodes.back().inputs) {
+        if (input.node.empty() || is_needed(index_.at(input.node))) continue;
+        input = {{}, {}, *saved_path(index_.at(input.node), input.port)};
+      }
+    }
+    return part;
+  }
+
   const fs::path* saved_path(std::size_t n, const std::string& port) const {
     const auto& node = pipeline_.nodes[n];
     const auto it = node.outputs.find(port.empty() ? stages_[n]->info().outputs.front().name : port);
@@ -209,12 +225,16 @@ class Runner {
     const auto start = std::chrono::steady_clock::now();
     try {
       context.progress(0, info.name);
-      std::vector<Data> inputs;
-      for (const Port& port : info.inputs) inputs.push_back(input_of(n, port, context));
-      static_cast<void>(context.take_report());
-      values_[n] = stages_[n]->run(inputs, context);
+      if (engine_) {
+        static_cast<void>(context.take_report());
+        values_[n] = engine_->run(node.id, context);
+      } else {
+        std::vector<Data> inputs;
+        for (const Port& port : info.inputs) inputs.push_back(input_of(n, port, context));
+        static_cast<void>(context.take_report());
+        values_[n] = stages_[n]->run(inputs, context);
+      }
       result.report = context.take_report();
-      inputs.clear();
       context.check_cancelled();
       result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       for (std::size_t p = 0; p < info.outputs.size(); ++p) {
@@ -288,7 +308,9 @@ class Runner {
         for (const auto& [port, input] : pipeline_.nodes[n].inputs)
           used = used || (is_needed(n) && !input.node.empty() && index_.at(input.node) == m);
       }
-      if (!used) values_[m].clear();
+      if (used || values_[m].empty()) continue;
+      values_[m].clear();
+      if (engine_) engine_->release(pipeline_.nodes[m].id);
     }
   }
 
@@ -301,6 +323,7 @@ class Runner {
   std::vector<NodeResult> results_;
   std::vector<bool> needed_;
   std::map<std::string, std::string> file_hashes_;
+  std::unique_ptr<Engine> engine_;
 };
 
 }  // namespace
@@ -368,8 +391,13 @@ void validate(Pipeline& pipeline, const Registry& registry) {
 }
 
 std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context) {
+  return run_pipeline(std::move(pipeline), registry, options, context, {});
+}
+
+std::vector<NodeResult> run_pipeline(Pipeline pipeline, const Registry& registry, const RunOptions& options, const Context& context,
+                                     const MakeEngine& make_engine) {
   validate(pipeline, registry);
-  return Runner(pipeline, registry, options, context).run();
+  return Runner(pipeline, registry, options, context).run(make_engine);
 }
 
 void require_replaceable(const fs::path& folder, const fs::path& output) {

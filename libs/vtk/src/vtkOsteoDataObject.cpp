@@ -1,9 +1,20 @@
 #include "osteo/vtk/vtkOsteoDataObject.h"
 
 #include <vtkInformation.h>
+#include <vtkInformationObjectBaseKey.h>
+#include <vtkNew.h>
 #include <vtkObjectFactory.h>
 
 vtkStandardNewMacro(vtkOsteoDataObject);
+
+namespace {
+
+vtkInformationObjectBaseKey* attached_key() {
+  static vtkInformationObjectBaseKey* const key = vtkInformationObjectBaseKey::MakeKey("ATTACHED_VALUE", "osteo", "vtkOsteoDataObject");
+  return key;
+}
+
+}  // namespace
 
 void vtkOsteoDataObject::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
@@ -39,4 +50,21 @@ unsigned long vtkOsteoDataObject::GetActualMemorySize() {
 
 vtkOsteoDataObject* vtkOsteoDataObject::GetData(vtkInformation* info) {
   return info != nullptr ? vtkOsteoDataObject::SafeDownCast(info->Get(vtkDataObject::DATA_OBJECT())) : nullptr;
+}
+
+void vtkOsteoDataObject::Attach(vtkDataObject* object, osteo::Data value) {
+  const vtkNew<vtkOsteoDataObject> holder;
+  holder->Value = std::move(value);
+  holder->Shown = object;
+  holder->ShownTime = object->GetMTime();
+  object->GetInformation()->Set(attached_key(), holder);
+}
+
+const osteo::Data* vtkOsteoDataObject::GetAttached(vtkDataObject* object) {
+  const auto* const holder = dynamic_cast<vtkOsteoDataObject*>(object->GetInformation()->Get(attached_key()));
+  return holder != nullptr && holder->Shown == object && holder->ShownTime == object->GetMTime() ? &holder->Value : nullptr;
+}
+
+void vtkOsteoDataObject::Detach(vtkDataObject* object) {
+  object->GetInformation()->Remove(attached_key());
 }

@@ -1,74 +1,28 @@
 #include "osteo/vtk/vtkOsteoStage.h"
 
 #include <vtkAlgorithmOutput.h>
+#include <vtkDataObject.h>
 #include <vtkDemandDrivenPipeline.h>
 #include <vtkErrorCode.h>
-#include <vtkImageData.h>
+#include <vtkExecutive.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
-#include <vtkMatrix3x3.h>
 #include <vtkObjectFactory.h>
-#include <vtkPointData.h>
-#include <vtkPolyData.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
-#include <vtkUnstructuredGrid.h>
 
 #include <algorithm>
 #include <atomic>
 #include <thread>
 
-#include "osteo/io/vtk_data.h"
-#include "osteo/vtk/vtkOsteoDataObject.h"
+#include "failure.h"
+#include "values.h"
 
+using osteo::class_of;
 using osteo::DataKind;
+using osteo::is_image;
 using Pipeline = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkOsteoStage);
-
-namespace {
-
-bool is_image(DataKind kind) {
-  return kind == DataKind::image || kind == DataKind::labels;
-}
-
-const char* class_of(DataKind kind) {
-  if (is_image(kind)) return "vtkImageData";
-  if (kind == DataKind::surface) return "vtkPolyData";
-  if (kind == DataKind::tets) return "vtkUnstructuredGrid";
-  return "vtkOsteoDataObject";
-}
-
-void set_image_information(vtkInformation* info, vtkImageData* image) {
-  int extent[6];
-  image->GetExtent(extent);
-  info->Set(Pipeline::WHOLE_EXTENT(), extent, 6);
-  info->Set(vtkDataObject::SPACING(), image->GetSpacing(), 3);
-  info->Set(vtkDataObject::ORIGIN(), image->GetOrigin(), 3);
-  info->Set(vtkDataObject::DIRECTION(), image->GetDirectionMatrix()->GetData(), 9);
-  if (image->GetPointData()->GetScalars() != nullptr) vtkDataObject::SetPointDataActiveScalarInfo(info, image->GetScalarType(), 1);
-}
-
-// The value of a VTK data object, as the first kind that the port accepts and the object can be.
-osteo::Data from_vtk(vtkDataObject* object, const osteo::Port& port) {
-  if (auto* const own = vtkOsteoDataObject::SafeDownCast(object)) return own->GetValue();
-  for (const DataKind kind : port.kinds) {
-    if (auto* const image = vtkImageData::SafeDownCast(object)) {
-      const bool bytes = image->GetScalarType() == VTK_UNSIGNED_CHAR;
-      const bool labels_too = std::find(port.kinds.begin(), port.kinds.end(), DataKind::labels) != port.kinds.end();
-      if (kind == DataKind::image && !(bytes && labels_too)) return osteo::image_from_vtk(image);
-      if (kind == DataKind::labels) return osteo::labels_from_vtk(image);
-    }
-    if (auto* const poly = vtkPolyData::SafeDownCast(object); poly != nullptr && kind == DataKind::surface) {
-      return std::make_shared<const osteo::TriMesh>(osteo::mesh_from_vtk(poly));
-    }
-    if (auto* const cells = vtkUnstructuredGrid::SafeDownCast(object); cells != nullptr && kind == DataKind::tets) {
-      return std::make_shared<const osteo::TetMesh>(osteo::tets_from_vtk(cells));
-    }
-  }
-  throw osteo::Error(osteo::ExitCode::usage, "the input '" + port.name + "' cannot be a " + object->GetClassName());
-}
-
-}  // namespace
 
 vtkOsteoStage::vtkOsteoStage() {
   this->SetNumberOfInputPorts(0);
@@ -143,6 +97,16 @@ void vtkOsteoStage::SetSourcePath(const std::string& input, const std::string& p
   this->Modified();
 }
 
+void vtkOsteoStage::SetThreads(int threads) {
+  this->Threads = threads;
+}
+
+void vtkOsteoStage::SetSeed(std::uint64_t seed) {
+  if (seed == this->Seed) return;
+  this->Seed = seed;
+  this->Modified();
+}
+
 int vtkOsteoStage::GetInputPortIndex(const std::string& name) const {
   for (std::size_t p = 0; p < this->StageInputOfPort.size(); ++p) {
     if (this->Stage->info().inputs[static_cast<std::size_t>(this->StageInputOfPort[p])].name == name) return static_cast<int>(p);
@@ -209,20 +173,7 @@ vtkTypeBool vtkOsteoStage::ProcessRequest(vtkInformation* request, vtkInformatio
 bool vtkOsteoStage::CreateOutputs(vtkInformationVector* outputs) {
   const auto& ports = this->Stage->info().outputs;
   for (std::size_t p = 0; p < ports.size(); ++p) {
-    vtkInformation* const info = outputs->GetInformationObject(static_cast<int>(p));
-    const std::string wanted = class_of(ports[p].kinds.front());
-    vtkDataObject* const present = info->Get(vtkDataObject::DATA_OBJECT());
-    if (present != nullptr && present->IsA(wanted.c_str())) continue;
-    vtkSmartPointer<vtkDataObject> fresh;
-    if (wanted == "vtkImageData")
-      fresh = vtkSmartPointer<vtkImageData>::New();
-    else if (wanted == "vtkPolyData")
-      fresh = vtkSmartPointer<vtkPolyData>::New();
-    else if (wanted == "vtkUnstructuredGrid")
-      fresh = vtkSmartPointer<vtkUnstructuredGrid>::New();
-    else
-      fresh = vtkSmartPointer<vtkOsteoDataObject>::New();
-    info->Set(vtkDataObject::DATA_OBJECT(), fresh);
+    osteo::make_object(outputs->GetInformationObject(static_cast<int>(p)), ports[p].kinds.front());
   }
   return true;
 }
@@ -236,17 +187,14 @@ bool vtkOsteoStage::Inform(vtkInformationVector** inputs, vtkInformationVector* 
   for (int p = 0; p < this->GetNumberOfInputPorts(); ++p) {
     for (int c = 0; c < this->GetNumberOfInputConnections(p); ++c) {
       vtkAlgorithmOutput* const from = this->GetInputConnection(p, c);
-      from->GetProducer()->Update(from->GetIndex());
+      if (from->GetProducer()->GetExecutive()->Update(from->GetIndex()) == 0) return false;  // it has said why
     }
     this->Results.clear();
   }
   if ((this->Results.empty() || this->ResultsTime < this->Superclass::GetMTime()) && !this->Run(inputs)) return false;
   for (std::size_t p = 0; p < ports.size(); ++p) {
     if (!is_image(ports[p].kinds.front())) continue;
-    vtkSmartPointer<vtkImageData> image = vtkSmartPointer<vtkImageData>::New();  // empty, for an output that was not made
-    if (const auto* i = std::get_if<osteo::Image>(&this->Results[p])) image = osteo::to_vtk(*i);
-    if (const auto* l = std::get_if<osteo::Labels>(&this->Results[p])) image = osteo::to_vtk(*l);
-    set_image_information(outputs->GetInformationObject(static_cast<int>(p)), image);
+    osteo::inform(outputs->GetInformationObject(static_cast<int>(p)), this->Results[p]);
   }
   return true;
 }
@@ -254,17 +202,23 @@ bool vtkOsteoStage::Inform(vtkInformationVector** inputs, vtkInformationVector* 
 bool vtkOsteoStage::Run(vtkInformationVector** inputs) {
   const auto& info = this->Stage->info();
   this->Failed = false;
+  this->Failure = nullptr;
   this->LastError.clear();
+  // VTK forgets an abort when it asks for data; a stage may be run before that.
+  this->AbortExecute = 0;
   std::atomic<bool> cancel{false};
-  osteo::Context context;
-  context.set_cancel_flag(&cancel);
+  osteo::Context alone;
+  alone.threads = this->Threads;
+  alone.seed = this->Seed;
+  alone.set_cancel_flag(&cancel);
   // Observers of VTK expect to be called from the thread that updates the pipeline.
   const auto caller = std::this_thread::get_id();
-  context.on_progress([&](double fraction, std::string_view) {
+  alone.on_progress([&](double fraction, std::string_view) {
     if (std::this_thread::get_id() != caller) return;
     this->UpdateProgress(fraction);
     if (this->GetAbortExecute() != 0) cancel = true;
   });
+  const osteo::Context& context = this->Surroundings != nullptr ? *this->Surroundings : alone;
   try {
     std::vector<osteo::Data> values(info.inputs.size());
     for (std::size_t i = 0; i < info.inputs.size(); ++i) {
@@ -278,17 +232,18 @@ bool vtkOsteoStage::Run(vtkInformationVector** inputs) {
       const auto i = static_cast<std::size_t>(this->StageInputOfPort[p]);
       if (this->GetNumberOfInputConnections(static_cast<int>(p)) == 0) continue;
       vtkDataObject* const object = inputs[p]->GetInformationObject(0)->Get(vtkDataObject::DATA_OBJECT());
-      if (object != nullptr) values[i] = from_vtk(object, info.inputs[i]);
+      if (object != nullptr) values[i] = osteo::value_of(object, info.inputs[i].kinds, info.inputs[i].name);
     }
     this->Results = this->Stage->run(values, context);
-    this->LastReport = context.take_report();
+    if (this->Surroundings == nullptr) {
+      context.check_cancelled();  // asked for in the last progress
+      this->LastReport = context.take_report();
+    }
     this->ResultsTime = this->Superclass::GetMTime();
     this->SetErrorCode(vtkErrorCode::NoError);
     return true;
-  } catch (const osteo::Error& e) {
-    this->Fail(&e, e.advice().empty() ? e.what() : std::string(e.what()) + ". " + e.advice());
-  } catch (const std::exception& e) {
-    this->Fail(nullptr, e.what());
+  } catch (const std::exception&) {
+    this->Fail();
   }
   return false;
 }
@@ -297,34 +252,18 @@ bool vtkOsteoStage::Execute(vtkInformationVector** inputs, vtkInformationVector*
   const bool ready = !this->Results.empty() && this->ResultsTime >= this->Superclass::GetMTime();
   if (!ready && !this->Run(inputs)) return false;
   for (std::size_t p = 0; p < this->Results.size(); ++p) {
-    vtkInformation* const info = outputs->GetInformationObject(static_cast<int>(p));
-    vtkDataObject* const object = info->Get(vtkDataObject::DATA_OBJECT());
-    const osteo::Data& value = this->Results[p];
-    if (std::holds_alternative<std::monostate>(value)) object->Initialize();  // an output that was not made, this time
-    if (auto* const image = vtkImageData::SafeDownCast(object)) {
-      if (const auto* i = std::get_if<osteo::Image>(&value)) image->ShallowCopy(osteo::to_vtk(*i));
-      if (const auto* l = std::get_if<osteo::Labels>(&value)) image->ShallowCopy(osteo::to_vtk(*l));
-    } else if (auto* const poly = vtkPolyData::SafeDownCast(object)) {
-      if (const auto* s = std::get_if<osteo::Surface>(&value)) poly->ShallowCopy(osteo::to_vtk(**s));
-    } else if (auto* const cells = vtkUnstructuredGrid::SafeDownCast(object)) {
-      if (const auto* t = std::get_if<osteo::Tets>(&value)) cells->ShallowCopy(osteo::to_vtk(**t));
-    } else if (auto* const own = vtkOsteoDataObject::SafeDownCast(object)) {
-      own->SetValue(value);
-    }
+    osteo::fill(outputs->GetInformationObject(static_cast<int>(p))->Get(vtkDataObject::DATA_OBJECT()), this->Results[p]);
   }
   this->Results.clear();
   return true;
 }
 
-void vtkOsteoStage::Fail(const osteo::Error* error, const std::string& text) {
+void vtkOsteoStage::Fail() {
   this->Failed = true;
+  this->Failure = std::current_exception();
   this->Results.clear();
-  this->LastError = text;
-  const auto code = error != nullptr ? error->code() : osteo::ExitCode::unspecified;
-  unsigned long vtk_code = vtkErrorCode::UserError + static_cast<unsigned long>(code);
-  if (code == osteo::ExitCode::no_input) vtk_code = vtkErrorCode::FileNotFoundError;
-  if (code == osteo::ExitCode::cannot_read) vtk_code = vtkErrorCode::CannotOpenFileError;
-  if (code == osteo::ExitCode::corrupt) vtk_code = vtkErrorCode::FileFormatError;
-  this->SetErrorCode(vtk_code);
-  vtkErrorMacro(<< this->Stage->info().name << ": " << text);
+  const osteo::VtkFailure failure = osteo::vtk_failure(this->Failure);
+  this->LastError = failure.text;
+  this->SetErrorCode(failure.code);
+  vtkErrorMacro(<< this->Stage->info().name << ": " << failure.text);
 }

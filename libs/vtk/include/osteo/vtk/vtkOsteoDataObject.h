@@ -24,6 +24,13 @@ class vtkOsteoDataObject : public vtkDataObject {
 
   static vtkOsteoDataObject* GetData(vtkInformation* info);
 
+  /// Lets a value go along with an object of VTK that shows it, for what VTK's classes have no place for (names of structures) and so that
+  /// nothing is made again from them. It is of this very object as it is now: copies have none, and a change (vtkObject::Modified) ends it.
+  static void Attach(vtkDataObject* object, osteo::Data value);
+  /// The object's value; null when it has none, or was changed since. The object's own: good until it changes.
+  static const osteo::Data* GetAttached(vtkDataObject* object);
+  static void Detach(vtkDataObject* object);
+
  protected:
   vtkOsteoDataObject() = default;
   ~vtkOsteoDataObject() override = default;
@@ -33,6 +40,8 @@ class vtkOsteoDataObject : public vtkDataObject {
   void operator=(const vtkOsteoDataObject&) = delete;
 
   osteo::Data Value;
+  const vtkDataObject* Shown = nullptr;  // of an attached value: whose, and how old that was; compared, never followed
+  vtkMTimeType ShownTime = 0;
 };
 
 #endif

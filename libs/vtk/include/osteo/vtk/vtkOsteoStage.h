@@ -15,9 +15,12 @@
 
 #include <vtkAlgorithm.h>
 
+#include <cstdint>
+#include <exception>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "osteo/base/error.h"
@@ -40,11 +43,21 @@ class vtkOsteoStage : public vtkAlgorithm {
   /// For one input of a stage that reads several (curve).
   void SetSourcePath(const std::string& input, const std::string& path);
 
+  /// Threads to work with; 0, all cores. Results do not depend on it.
+  void SetThreads(int threads);
+  /// Of random choices; 1 when it was not set.
+  void SetSeed(std::uint64_t seed);
+  /// A program's own surroundings in place of the above: threads, seed, progress, notes, report and cancellation are this context's, VTK's
+  /// progress events and abort are not used. Borrowed until the next call; null: back to VTK's.
+  void SetContext(const osteo::Context* context) { this->Surroundings = context; }
+
   /// Index of the VTK port of a stage's input or output; -1 when there is none.
   int GetInputPortIndex(const std::string& name) const;
   int GetOutputPortIndex(const std::string& name) const;
 
   const std::string& GetLastError() const { return this->LastError; }
+  /// What the stage threw in the last run, once; null when it threw nothing or was asked before.
+  std::exception_ptr TakeFailure() { return std::exchange(this->Failure, nullptr); }
   /// Facts measured in the last run, e.g. volume_after_mm3.
   const osteo::Report& GetReport() const { return this->LastReport; }
 
@@ -65,7 +78,7 @@ class vtkOsteoStage : public vtkAlgorithm {
   bool Inform(vtkInformationVector** inputs, vtkInformationVector* outputs);
   bool Execute(vtkInformationVector** inputs, vtkInformationVector* outputs);
   bool Run(vtkInformationVector** inputs);
-  void Fail(const osteo::Error* error, const std::string& text);
+  void Fail();  // with the exception that is being handled
 
   std::unique_ptr<osteo::Stage> Stage;
   std::vector<int> StageInputOfPort;  // VTK input port -> input of the stage (file inputs have no VTK port)
@@ -73,7 +86,11 @@ class vtkOsteoStage : public vtkAlgorithm {
   std::map<std::string, std::string> SourcePaths;
   std::vector<osteo::Data> Results;  // of a run done ahead, when its output's extent had to be known
   vtkMTimeType ResultsTime = 0;
+  int Threads = 0;
+  std::uint64_t Seed = 1;
+  const osteo::Context* Surroundings = nullptr;
   bool Failed = false;
+  std::exception_ptr Failure;
   std::string LastError;
   osteo::Report LastReport;
 };
