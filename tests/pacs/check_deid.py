@@ -197,6 +197,12 @@ for name in ("good", "screen", "words", "person"): os.remove(f"mixed/{name}.dcm"
 run("deidentify", "mixed", "-o", "none", rc=7)
 assert not pathlib.Path("none").exists()
 
+# Someone else has been there before.
+d = base(n=20)
+d.PatientID = d.PatientName = "Removed"
+save(d, "before/a.dcm")
+run("deidentify", "before", "-o", "before-out")
+
 # 4. By send: the copies alone.
 assert "left out" in run("send", "mixed", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", rc=7).stderr
 assert json.loads(run("send", "two", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", "--json").stdout)["kinds"][0]["objects"] == 2

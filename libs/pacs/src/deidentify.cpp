@@ -264,6 +264,7 @@ std::set<std::string> telling_words(DcmItem& data) {
     if (e.ident() == EVR_PN || tag == DCM_PatientID || tag == DCM_AccessionNumber || tag == DCM_OtherPatientNames)
       telling.merge(words_of(value_of(e), 4));
   });
+  telling.erase("removed");  // our own dummy, and what others have put there before
   return telling;
 }
 
