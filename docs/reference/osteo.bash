@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare batch report approve edit hand-over take-back scene plan rehearse replay playback tutor join score movie review export sound heat monitor stream console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen send fetch receive watch doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare batch report approve edit hand-over take-back scene plan rehearse replay playback tutor join score movie review export sound heat monitor stream console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen deidentify send fetch receive watch doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -120,7 +120,8 @@ _osteo() {
     calibrate-camera) flags="$flags --out --seconds --width --height --fps --latency-ms" ;;
     calibrate-pen) flags="$flags --camera --out --pen --ruler-mm --seconds" ;;
     track-pen) flags="$flags --camera --pen --seconds" ;;
-    send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dry-run --check" ;;
+    deidentify) flags="$flags --out --key --map" ;;
+    send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dry-run --check --deidentify --key" ;;
     fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --out --study --series --accession --patient-id --date --modality --series-gb" ;;
     receive) flags="$flags --ae --bind --port --allow --anybody --associations --object-gb --folder-gb --keep-free-gb --memory-mb --timeout-s --association-s --quiet-s --metrics --tls-ca --tls-certificate --tls-key" ;;
     watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --once --no-report --metrics" ;;

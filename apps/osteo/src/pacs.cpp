@@ -1,6 +1,7 @@
 // send, fetch, receive: to and from a PACS.
 #include <cmath>
 #include <map>
+#include <optional>
 #include <ostream>
 
 #include "osteo/base/json_document.h"
@@ -43,15 +44,30 @@ cli::CommandInfo SendCommand::info() {
       "objects to a PACS, by C-STORE",
       "Sends a DICOM file, or all DICOM files of a folder, as they are: what was converted by to-slicer, save-series or a report leaves "
       "only "
-      "by this command. Every answer of the node is judged, and the node is then asked which of the objects it has. Nothing is taken out: "
-      "what names a person in the files is sent with them. Exit code 8 when some were refused or are not found afterwards.",
+      "by this command. Every answer of the node is judged, and the node is then asked which of the objects it has. Nothing is taken out "
+      "without --deidentify: what names a person in the files is sent with them. Exit code 8 when some were refused or are not found "
+      "afterwards.",
       {{"source", "a file or a folder"}},
       "osteo send CASE.seg.dcm --peer ORTHANC@127.0.0.1:4242 --dry-run"};
 }
 
 int SendCommand::run(const Params& p, cli::Invocation& io) {
   const DicomPeer peer = peer_of(p);
-  const DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, p.dry_run ? 1 : 0.1));
+  if (!p.key.empty() && !p.deidentify) throw Error(ExitCode::usage, "--key is for --deidentify", "add it, or leave the key out");
+  DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, p.dry_run && !p.deidentify ? 1 : 0.05));
+  std::optional<TemporaryFolder> copies;
+  std::size_t left_out = 0;
+  if (p.deidentify) {
+    copies.emplace();
+    const DeidentifyReport made = deidentify_objects(all.objects, copies->path(), {p.key}, io.context.sub(0.05, p.dry_run ? 1 : 0.1));
+    io.end_progress();
+    left_out = made.refused.size();
+    told_refusals(made, io);
+    if (made.written == 0) throw Error(ExitCode::failed, "nothing may leave: each object is left out");
+    std::vector<fs::path> set_aside = std::move(all.set_aside);
+    all = list_objects({copies->path()});
+    all.set_aside = std::move(set_aside);
+  }
   std::map<std::string, std::pair<int, std::uint64_t>> kinds;
   std::uint64_t bytes = 0;
   for (const DicomObject& o : all.objects) {
@@ -69,12 +85,18 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
   if (p.dry_run) {
     io.end_progress();
     if (io.common.json) {
-      io.out << Json{{"dry_run", true}, {"peer", peer_text(peer)}, {"kinds", listed}, {"set_aside", all.set_aside.size()}}.dump(2) << '\n';
+      io.out << Json{{"dry_run", true},
+                     {"peer", peer_text(peer)},
+                     {"kinds", listed},
+                     {"set_aside", all.set_aside.size()},
+                     {"left_out", left_out}}
+                    .dump(2)
+             << '\n';
     } else {
       io.out << "would send to " << peer_text(peer) << " as " << peer.own_ae << ":\n";
       for (const auto& [kind, n] : kinds) io.out << "  " << n.first << " x " << kind << ", " << megabytes(n.second) << '\n';
     }
-    return 0;
+    return static_cast<int>(left_out == 0 ? ExitCode::ok : ExitCode::partial);
   }
   const SendReport report = send_objects(peer, all.objects, p.check, io.context.sub(0.1, 1));
   io.end_progress();
@@ -96,7 +118,8 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
                    {"checked", report.not_checked.empty()},
                    {"safe", report.safe()},
                    {"problems", problems},
-                   {"set_aside", all.set_aside.size()}}
+                   {"set_aside", all.set_aside.size()},
+                   {"left_out", left_out}}
                   .dump(2)
            << '\n';
   }
@@ -108,7 +131,7 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
            << '\n';
   }
   for (const auto& [problem, n] : why) io.err << n.first << " objects: " << problem << ", the first: " << n.second << '\n';
-  return static_cast<int>(report.safe() == report.objects.size() ? ExitCode::ok : ExitCode::partial);
+  return static_cast<int>(report.safe() == report.objects.size() && left_out == 0 ? ExitCode::ok : ExitCode::partial);
 }
 
 cli::CommandInfo FetchCommand::info() {

@@ -1,8 +1,11 @@
 // The verbs that speak to a PACS.
 #pragma once
+#include <cstddef>
+#include <map>
 #include <string>
 
 #include "osteo/cli/command.h"
+#include "osteo/pacs/deidentify.h"
 #include "osteo/pacs/peer.h"
 
 namespace osteo {
@@ -33,11 +36,31 @@ struct SendCommand {
   struct Params : PeerFlags {
     bool dry_run = false;
     bool check = true;
+    bool deidentify = false;
+    std::string key;
   };
   static void describe(Params& p, auto& visit) {
     PeerFlags::describe(p, visit);
     visit({"dry_run", "say what would leave, and speak to nobody"}, p.dry_run);
     visit({"check", "ask afterwards which of the objects the node has (--no-check: believe its answers)"}, p.check);
+    visit({"deidentify", "send copies as 'osteo deidentify' makes them; what it leaves out does not leave"}, p.deidentify);
+    visit({"key", "with --deidentify: as there"}, p.key);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+/// Says on standard error why how many were left out, and counts them by reason.
+std::map<std::string, std::size_t> told_refusals(const DeidentifyReport& report, cli::Invocation& invocation);
+
+struct DeidentifyCommand {
+  struct Params {
+    std::string out, key, map;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"out", "folder for the result, which must not be there (also -o)"}, p.out);
+    visit({"key", "file of 32 bytes or more, mode 600: the same key gives the same codes and UIDs (empty: a new one, forgotten)"}, p.key);
+    visit({"map", "file, mode 600, that leads from codes and new UIDs back to the originals (empty: none)"}, p.map);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

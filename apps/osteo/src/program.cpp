@@ -58,6 +58,7 @@ cli::Program make_osteo_program() {
   p.add<CalibrateCameraCommand>();
   p.add<CalibratePenCommand>();
   p.add<TrackPenCommand>();
+  p.add<DeidentifyCommand>();
   p.add<SendCommand>();
   p.add<FetchCommand>();
   p.add<ReceiveCommand>();
