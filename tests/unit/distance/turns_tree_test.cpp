@@ -65,7 +65,9 @@ TEST(TurnsTree, ValuesAreWithinTheirBound) {
     const TurnsTree tree(fans_of(s));
     const BoxMm box = bounds_of(s);
     for (int i = 0; i < 150; ++i) {
-      const Vec3 size = box.hi - box.lo, p = box.lo + Vec3{u(random) * size.x, u(random) * size.y, u(random) * size.z};
+      const Vec3 size = box.hi - box.lo, middle = (box.lo + box.hi) / 2;
+      Vec3 p = box.lo + Vec3{u(random) * size.x, u(random) * size.y, u(random) * size.z};
+      if (i % 3 == 0) p = middle + (p - middle) * 60;  // far: each order is a different power of the distance
       const double exact = tree.sum(p);
       for (const double tolerance : {10.0, 0.3, 1e-3, 1e-9}) {
         const TurnsTree::Turns t = tree.turns(p, tolerance);
