@@ -3,6 +3,7 @@
 
 #include "osteo/distance/distance_map.h"
 #include "tree_data.h"
+#include "turns_tree.h"
 #include "winding.h"
 
 namespace osteo {
@@ -18,8 +19,8 @@ SignedDistance::SignedDistance(const TriangleSoup& soup, const Context& context)
     surface_ = mended.soup;
     ray_tree_ = surface_.triangles.empty() ? TriangleTree() : TriangleTree(surface_, context);
   }
-  fans_ = closing_fans(mended, surface_.points_mm);
-  closed_ = fans_.empty();
+  fans_ = std::make_shared<const TurnsTree>(closing_fans(mended, surface_.points_mm));
+  closed_ = fans_->empty();
 }
 
 SignedDistance::Answer SignedDistance::at(Vec3 p, std::uint32_t hint) const {
@@ -60,10 +61,8 @@ bool SignedDistance::inside(Vec3 p) const {
       }
     }
   }
-  double w = winding;
-  for (const Fan& f : fans_) w += f.weight * crossing_before(f.a, f.b, f.c, p);
-  for (const Fan& f : fans_) w -= f.weight * solid_angle(f.a, f.b, f.c, p) / (4 * std::numbers::pi);
-  return std::abs(w) > 0.5;
+  if (closed_) return winding != 0;
+  return fans_->beyond_half(winding + fans_->crossings_before(p), p);
 }
 
 }  // namespace osteo

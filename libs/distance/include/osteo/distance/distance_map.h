@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -71,6 +72,8 @@ class DistanceMapper {
   InsideReport report_;
 };
 
+class TurnsTree;  // private to libs/distance
+
 /// Signed distance and closest point at given points. The sign as voxels_inside tells it.
 class SignedDistance {
  public:
@@ -79,7 +82,7 @@ class SignedDistance {
     ClosestPoint closest;
     double signed_mm = 0;  ///< negative inside
   };
-  /// O(log n + openings). Any number of threads may ask at once.
+  /// O(log n); where a point's winding number is within rounding of one half, also O(openings). Any number of threads may ask at once.
   [[nodiscard]] Answer at(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone) const;
   /// As of TriangleTree.
   [[nodiscard]] ClosestPoint closest(Vec3 point_mm, std::uint32_t hint = ClosestPoint::kNone,
@@ -93,7 +96,7 @@ class SignedDistance {
  private:
   TriangleTree tree_, ray_tree_;
   TriangleSoup surface_;  // what the rays meet: in order, when it was not closed
-  std::vector<Fan> fans_;
+  std::shared_ptr<const TurnsTree> fans_;
   bool closed_ = true;
 };
 
