@@ -24,8 +24,10 @@ refused "OSTEO_TESTS=OFF" cmake -S "$source/tests/setup/outside" -B "$work/tests
 # As an archive: what would be committed, without what is built.
 if command -v git >/dev/null && [ -e "$source/.git" ]; then
   (cd "$source" && git -c safe.directory='*' ls-files -co --exclude-standard | while read -r f; do [ ! -f "$f" ] || echo "$f"; done | grep -v '^docs/\|^testdata/' | tar --transform 's|^|osteotome/|' -cf "$work/new.tar" -T -)
-  cmp -s "$work/new.tar" "$work/osteotome.tar" || mv "$work/new.tar" "$work/osteotome.tar"
-  quietly cmake -S "$source/tests/setup/outside" -B "$work/fetched" "${common[@]}" -DUSE=fetched -DOSTEO_ARCHIVE="$work/osteotome.tar" -DEXAMPLES=
+  # A name of its own for each: what was fetched from a name is not fetched again.
+  archive=$work/osteotome-$(sha256sum "$work/new.tar" | cut -c1-12).tar
+  [ -e "$archive" ] || { rm -f "$work"/osteotome-*.tar; find "$work/fetched" -name 'libosteo_*' -delete 2>/dev/null || true; mv "$work/new.tar" "$archive"; }
+  quietly cmake -S "$source/tests/setup/outside" -B "$work/fetched" "${common[@]}" -DUSE=fetched -DOSTEO_ARCHIVE="$archive" -DEXAMPLES=
   quietly cmake --build "$work/fetched" --target one_library
   quietly "$work/fetched/one_library"
   [ -z "$(find "$work/fetched" -name 'libosteo_*.so*' -o -name 'libosteo_view.a' -o -name 'libosteo_io.a')" ] || { echo "more was built than was asked for"; exit 1; }
