@@ -33,10 +33,16 @@ if(OSTEO_SANITIZE)
 endif()
 
 # One heavy translation unit (OpenVDB: 0.8 GiB) at a time.
-set_property(GLOBAL PROPERTY JOB_POOLS heavy=1)
+set_property(GLOBAL APPEND PROPERTY JOB_POOLS osteo_heavy=1)
+
+# Asked before packages from outside are looked for: one of them (DCMTK) sets BUILD_SHARED_LIBS for itself.
+set(OSTEO_LIBRARY_KIND STATIC)
+if(BUILD_SHARED_LIBS)
+  set(OSTEO_LIBRARY_KIND SHARED)
+endif()
 
 # The rows of libs/layers.txt: OSTEO_LAYER_<name>_PUBLIC and _PRIVATE hold what a library takes from others.
-set(layers_file ${CMAKE_SOURCE_DIR}/libs/layers.txt)
+set(layers_file ${PROJECT_SOURCE_DIR}/libs/layers.txt)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${layers_file})
 file(STRINGS ${layers_file} layers REGEX "^[a-z]")
 foreach(row ${layers})
@@ -49,6 +55,27 @@ foreach(row ${layers})
   list(APPEND OSTEO_LAYERS ${name})
 endforeach()
 
+# The rows of libs/components.txt: OSTEO_COMPONENT_<name> holds the libraries of a component that other projects may ask for.
+set(components_file ${PROJECT_SOURCE_DIR}/libs/components.txt)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${components_file})
+file(STRINGS ${components_file} components REGEX "^[a-z]")
+foreach(row ${components})
+  if(NOT row MATCHES "^([a-z_]+) +\\| *([a-z_ ]+)$")
+    message(FATAL_ERROR "libs/components.txt: cannot read '${row}'; a row is: component | libraries")
+  endif()
+  set(name ${CMAKE_MATCH_1})
+  separate_arguments(OSTEO_COMPONENT_${name} UNIX_COMMAND "${CMAKE_MATCH_2}")
+  if(name IN_LIST OSTEO_LAYERS)
+    message(FATAL_ERROR "libs/components.txt: ${name} is a library already, and by that a component")
+  endif()
+  foreach(library ${OSTEO_COMPONENT_${name}})
+    if(NOT library IN_LIST OSTEO_LAYERS)
+      message(FATAL_ERROR "libs/components.txt: ${name} holds ${library}, which libs/layers.txt does not know")
+    endif()
+  endforeach()
+  list(APPEND OSTEO_COMPONENT_NAMES ${name})
+endforeach()
+
 # osteo_library(name [HEAVY] [PUBLIC targets...] [PRIVATE targets...])
 # Sources are libs/<name>/src/*.cpp, public headers libs/<name>/include. Targets are those from outside; what it takes from other libraries
 # stands in libs/layers.txt. A row that this build leaves out (copyleft) is not linked.
@@ -57,10 +84,11 @@ function(osteo_library name)
   if(NOT name IN_LIST OSTEO_LAYERS)
     message(FATAL_ERROR "libs/layers.txt has no row for ${name}")
   endif()
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/libs/${name}/src/*.cpp)
-  add_library(osteo_${name} STATIC ${sources})
-  target_include_directories(osteo_${name} PUBLIC $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/libs/${name}/include>
-    $<INSTALL_INTERFACE:include> PRIVATE ${CMAKE_SOURCE_DIR}/libs/${name}/src)
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/libs/${name}/src/*.cpp)
+  add_library(osteo_${name} ${OSTEO_LIBRARY_KIND} ${sources})
+  target_compile_features(osteo_${name} PUBLIC cxx_std_20)
+  target_include_directories(osteo_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/libs/${name}/include>
+    $<INSTALL_INTERFACE:include> PRIVATE ${PROJECT_SOURCE_DIR}/libs/${name}/src)
   target_link_libraries(osteo_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   foreach(kind PUBLIC PRIVATE)
     foreach(other ${OSTEO_LAYER_${name}_${kind}})
@@ -72,12 +100,32 @@ function(osteo_library name)
     endforeach()
   endforeach()
   add_library(osteo::${name} ALIAS osteo_${name})
+  # Shared ones carry MAJOR.MINOR: while MAJOR is 0, a MINOR may break. No macro for exports (all is exported), so both kinds are made of the same
+  # objects; each must name all that it takes.
+  set_target_properties(osteo_${name} PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    DEFINE_SYMBOL "" INSTALL_RPATH "$ORIGIN")
+  if(OSTEO_LIBRARY_KIND STREQUAL SHARED AND NOT OSTEO_SANITIZE AND NOT OSTEO_FUZZ)
+    target_link_options(osteo_${name} PRIVATE LINKER:--no-undefined)
+  endif()
   # So that a shared object (Python, another program's) can take it; calls within a library are inlined as before. Sanitized builds make none.
   if(NOT OSTEO_SANITIZE AND NOT OSTEO_FUZZ)
     set_property(TARGET osteo_${name} PROPERTY POSITION_INDEPENDENT_CODE ON)
     target_compile_options(osteo_${name} PRIVATE -fno-semantic-interposition)
   endif()
   if(ARG_HEAVY)
-    set_property(TARGET osteo_${name} PROPERTY JOB_POOL_COMPILE heavy)
+    set_property(TARGET osteo_${name} PROPERTY JOB_POOL_COMPILE osteo_heavy)
   endif()
+endfunction()
+
+# The components of libs/components.txt, of the libraries that are there.
+function(osteo_components)
+  foreach(component ${OSTEO_COMPONENT_NAMES})
+    add_library(osteo_${component} INTERFACE)
+    add_library(osteo::${component} ALIAS osteo_${component})
+    foreach(library ${OSTEO_COMPONENT_${component}})
+      if(TARGET osteo_${library})
+        target_link_libraries(osteo_${component} INTERFACE osteo_${library})
+      endif()
+    endforeach()
+  endforeach()
 endfunction()

@@ -23,7 +23,13 @@ bash -n "$p/share/bash-completion/completions/osteo"
 ! command -v xmllint >/dev/null || xmllint --noout "$p/share/mime/packages/osteo.xml" "$p"/share/osteo/slicer/*.xml
 # No path of the source or build tree in what others read.
 ! grep -rlF -e "$source/libs" -e "$build" "$p"/lib*/cmake "$p"/lib/*/cmake 2>/dev/null || { echo "the installation names the tree it was built in"; exit 1; }
-cmake -S "$source/tests/setup/outside" -B "$work/outside" -DCMAKE_PREFIX_PATH="$p" -DCMAKE_BUILD_TYPE=Release >"$work/said" 2>&1 || { tail -30 "$work/said"; exit 1; }
+outside() { cmake -S "$source/tests/setup/outside" -B "$work/outside" -DCMAKE_PREFIX_PATH="$p" -DCMAKE_BUILD_TYPE=Release "$@" >"$work/said" 2>&1; }
+! outside -DEXAMPLES="import;hearing" || { echo "a component that does not exist was found"; exit 1; }
+tr -s ' \n' ' ' <"$work/said" | grep -q "osteo has no component 'hearing'. This installation has: base .* geometry" || { tail -30 "$work/said"; exit 1; }
+outside -DEXAMPLES="import;geometry;haptics;tissue;rehearsal;assessment;pictures" || { tail -30 "$work/said"; exit 1; }
 cmake --build "$work/outside" >"$work/said" 2>&1 || { tail -30 "$work/said"; exit 1; }
+# Each component's example knows what must come out.
+ctest --test-dir "$work/outside" --output-on-failure >"$work/said" 2>&1 || { tail -60 "$work/said"; exit 1; }
+grep -q '100% tests passed, 0 tests failed out of 8' "$work/said" || { tail -20 "$work/said"; exit 1; }
 cd "$work" && "$work/outside/outside" | grep -q '4 triangles, watertight: yes, 36.000 mm3'
 echo "installed, found from outside and run"
