@@ -107,7 +107,7 @@ _osteo() {
     review) flags="$flags --out --procedure --mirror --reference --subject --earlier --no-pictures --case-folder" ;;
     export) flags="$flags" ;;
     sound) flags="$flags --volume --alarms --case-folder" ;;
-    heat) flags="$flags --cutting-share --diamond-w-per-n --water-c --film --cell-mm --case-folder" ;;
+    heat) flags="$flags --cutting-share --diamond-w-per-n --water-c --film --cell-mm --report --case-folder" ;;
     monitor) flags="$flags --out --setup --channel --stimulator-ma --pulses-per-s --width-ms --search --hand --heat --case-folder" ;;
     stream) flags="$flags --to --setup --speed --listeners --wait-s --case-folder" ;;
     console) flags="$flags --sound --code --width --height --scale --state-file" ;;

@@ -4,7 +4,9 @@
 
 #include "commands.h"
 #include "osteo/base/error.h"
+#include "osteo/base/files.h"
 #include "osteo/base/json.h"
+#include "osteo/review/heat_sheet.h"
 #include "osteo/scene/heat_reader.h"
 #include "osteo/scene/session_folder.h"
 #include "osteo/session/session_reader.h"
@@ -24,6 +26,11 @@ cli::CommandInfo HeatCommand::info() {
 }
 
 int HeatCommand::run(const Params& p, cli::Invocation& io) {
+  const std::string kind = fs::path(p.report).extension().string();
+  if (!p.report.empty() && kind != ".html" && kind != ".pdf")
+    throw Error(ExitCode::usage, "'" + p.report + "' is neither .html nor .pdf", "--report heat.html");
+  if (!p.report.empty() && fs::exists(p.report) && !io.common.force)
+    throw Error(ExitCode::cannot_write, "'" + p.report + "' exists already", "--force replaces it");
   const SessionFolder folder = open_session_folder(io.arguments[0], p.case_folder);
   const SessionReader session(folder.stream(), Damage::keep);
   const SessionOutline& outline = session.outline();
@@ -38,9 +45,14 @@ int HeatCommand::run(const Params& p, cli::Invocation& io) {
   params.film_w_per_m2_k = p.film;
   params.cell_mm = p.cell_mm;
   HeatReader heat(world, anatomy.structures.get(), outline.header.rate_hz, params);
+  if (!p.report.empty()) heat.keep_history();
   Reader* const readers[] = {&heat};
   const ReplayResult r = replay(session, std::move(world), anatomy, io.context, readers);
   io.end_progress();
+  if (!p.report.empty()) {
+    const Sheet sheet = review::heat_sheet(heat, anatomy.structures.get(), params, folder.folder.filename().string());
+    write_file(p.report, kind == ".pdf" ? sheet_pdf(sheet) : sheet_html(sheet));
+  }
   const auto tenths = [](double x) { return std::round(x * 10) / 10; };
   const auto minutes = [](double x) { return x < 1000 ? std::round(x * 100) / 100 : std::round(x); };
   const HeatLedger l = heat.ledger();

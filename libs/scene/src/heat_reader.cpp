@@ -28,6 +28,7 @@ struct HeatReader::Body {
   int edge = 1;  // voxels along a cell
   std::unique_ptr<HeatField> field;
   std::map<std::array<int, 3>, std::vector<std::pair<int, std::size_t>>> places;  // by brick of cells: cell, number in places_
+  std::map<std::array<int, 3>, std::array<double, BrickGrid::kVoxels>> peaks;     // by brick of cells: K, where history is kept
 
   [[nodiscard]] Ijk cell_of(Ijk voxel) const {
     const auto down = [&](int v) { return v >= 0 ? v / edge : -((edge - 1 - v) / edge); };
@@ -126,6 +127,8 @@ void HeatReader::resync(const World& world) {
   pending_.clear();
   begin(world);
   ++restarts_;
+  courses_.clear();
+  steps_ = 0;
 }
 
 void HeatReader::scene_changed(const World& world, const World::Effect& effect) {
@@ -237,6 +240,10 @@ void HeatReader::step() {
     hottest_c_ = std::max(hottest_c_, params_.body_c + b->field->hottest());
     for (const Ijk brick : b->field->warm_bricks()) {
       const std::span<const double> kelvin = b->field->brick(brick);
+      if (history_) {
+        auto& peaks = b->peaks[{brick.i, brick.j, brick.k}];
+        for (std::size_t c = 0; c < kelvin.size(); ++c) peaks[c] = std::max(peaks[c], kelvin[c]);
+      }
       const auto places = b->places.find({brick.i, brick.j, brick.k});
       if (places == b->places.end()) continue;
       for (const auto& [cell, number] : places->second) {
@@ -246,6 +253,67 @@ void HeatReader::step() {
       }
     }
   }
+  if (history_) keep_course();
+}
+
+void HeatReader::keep_history() {
+  history_ = true;
+}
+
+void HeatReader::keep_course() {
+  std::map<std::uint8_t, double> now;
+  for (const Place& p : places_) {
+    if (p.dose.peak_c <= params_.body_c) continue;
+    double& c = now.try_emplace(p.structure, p.now_c).first->second;
+    c = std::max(c, p.now_c);
+  }
+  for (const auto& [value, c] : now) {
+    std::vector<double>& course = courses_[value];
+    course.resize(steps_, params_.body_c);  // until now it was as warm as the body
+    course.push_back(c);
+  }
+  ++steps_;
+}
+
+double HeatReader::peak_c_at(Vec3 world_mm) const {
+  double peak_k = 0;
+  for (const auto& b : bodies_) {
+    if (b->peaks.empty()) continue;
+    const Vec3 x = b->cells_from_world(world_mm);
+    const Ijk lo{static_cast<int>(std::floor(x.x)), static_cast<int>(std::floor(x.y)), static_cast<int>(std::floor(x.z))};
+    double sum = 0, weights = 0;
+    for (int n = 0; n < 8; ++n) {
+      const Ijk c{lo.i + (n & 1), lo.j + (n >> 1 & 1), lo.k + (n >> 2)};
+      if (b->bone.nearest(b->body_from_cells(vec(c))) <= 0) continue;
+      const double w = (1 - std::abs(x.x - c.i)) * (1 - std::abs(x.y - c.j)) * (1 - std::abs(x.z - c.k));
+      const auto brick = b->peaks.find({c.i >> 3, c.j >> 3, c.k >> 3});
+      if (brick != b->peaks.end()) sum += w * brick->second[static_cast<std::size_t>((c.i & 7) | (c.j & 7) << 3 | (c.k & 7) << 6)];
+      weights += w;
+    }
+    if (weights > 0) peak_k = std::max(peak_k, sum / weights);
+  }
+  return params_.body_c + peak_k;
+}
+
+double HeatReader::bone_at(Vec3 world_mm) const {
+  float most = 0;
+  for (const auto& b : bodies_) most = std::max(most, b->bone.nearest(b->world_from_body.inverse()(world_mm)));
+  return static_cast<double>(most);
+}
+
+std::optional<HeatReader::Warmest> HeatReader::warmest_left() const {
+  std::optional<Warmest> warmest;
+  for (const auto& b : bodies_) {
+    for (const auto& [brick, peaks] : b->peaks) {
+      for (int c = 0; c < BrickGrid::kVoxels; ++c) {
+        const double peak_c = params_.body_c + peaks[static_cast<std::size_t>(c)];
+        if (peak_c <= (warmest ? warmest->peak_c : params_.body_c)) continue;
+        const Ijk cell{brick[0] * 8 + (c & 7), brick[1] * 8 + (c >> 3 & 7), brick[2] * 8 + (c >> 6)};
+        if (b->matter(cell, nullptr).bone >= 0.5F) warmest = Warmest{b->world_from_body(b->body_from_cells(vec(cell))), peak_c};
+      }
+    }
+  }
+  return warmest;
 }
 
 double HeatReader::celsius_at(Vec3 world_mm) const {

@@ -8,7 +8,9 @@
 #include "evidence/scene.h"
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/bone/instrument.h"
 #include "osteo/grid/brick_places.h"
+#include "osteo/review/heat_sheet.h"
 #include "osteo/view/stills.h"
 #include "scene_parts.h"
 #include "scratch.h"
@@ -211,6 +213,48 @@ TEST(Stills, ShowPartsWhereTheyAreAndCutThemOpen) {
   EXPECT_TRUE(yellow(at(pictures[1], 40, 50)));                                    // 2 mm off: the far side, from within
   EXPECT_TRUE(yellow(at(pictures[0], 28, 50)));                                    // 4.4 mm off
   for (const int x : {2, 20, 97}) EXPECT_GT(at(pictures[0], x, 50)[2], 200) << x;  // beyond it: the ground
+}
+
+// Pressed by a diamond burr from above: the section is red there, grey far off, and nothing is painted where there is no bone.
+TEST(HeatSheet, ASectionShowsWhereItWasHot) {
+  const World world =
+      test::solid_world([](Vec3 p) { return std::min(8 - std::abs(p.x), std::min(6 - std::abs(p.y), 4 - std::abs(p.z))); }, 0.5, 24);
+  const StructureMap ball = test::structure_map(
+      [](Vec3 p) -> std::uint8_t {
+        return length(p - Vec3{0, 0, 1}) < 1.5 ? 1 : 0;
+      },
+      {{1, "ball", {}}}, 0.5, 24);
+  HeatReader heat(world, &ball, 1000);
+  heat.keep_history();
+  TickRecord r;
+  r.device.position_mm = {0, 0, 5.6F};
+  r.device.tool = static_cast<std::uint8_t>(burr_index(BurrKind::diamond, 4));
+  r.force_n = {0, 0, 3};
+  r.normal_force_n = 3;
+  r.speed_rpm = 40000;
+  for (r.tick = 0; r.tick < 3000; ++r.tick) heat.tick(r, {});
+  const Picture p = review::heat_section(heat, &ball, {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, 24, 240);
+  const auto at = [&](double x, double z) {
+    const auto column = static_cast<std::size_t>(std::lround(120 + 10 * x)), row = static_cast<std::size_t>(std::lround(120 - 10 * z));
+    const std::size_t n = 3 * (row * 240 + column);
+    return std::array<int, 3>{p.rgb[n], p.rgb[n + 1], p.rgb[n + 2]};
+  };
+  const auto hot = at(0.25, 3.55), cold = at(-7.2, -3.2), air = at(0, 8), warm = at(3.1, 3.1);
+  EXPECT_GT(hot[0] - hot[1], 60) << hot[0] << " " << hot[1] << " " << hot[2];
+  EXPECT_LT(std::abs(cold[0] - cold[2]), 30);
+  EXPECT_GT(cold[0], 150);
+  EXPECT_LT(air[0], 60);
+  EXPECT_GT(warm[0] - warm[2], cold[0] - cold[2]) << "between the two";
+  const Sheet sheet = review::heat_sheet(heat, &ball, {}, "press");
+  const std::string html = sheet_html(sheet);
+  EXPECT_NE(html.find("ball"), std::string::npos);
+  EXPECT_EQ(pictures_of_html(html).size(), 3U);
+  EXPECT_NE(html.find("Nothing clinical"), std::string::npos);
+  // Nothing drilled, nothing warm: said so.
+  const HeatReader idle(world, nullptr, 1000);
+  const std::string cool = sheet_html(review::heat_sheet(idle, nullptr, {}, "idle"));
+  EXPECT_NE(cool.find("no bone that is left was warmer"), std::string::npos);
+  EXPECT_TRUE(pictures_of_html(cool).empty());
 }
 
 }  // namespace

@@ -136,6 +136,66 @@ TEST(HeatReader, IsAmongTheMetricsOfAScore) {
   EXPECT_EQ(bare[1].word, "the case has no structures");
 }
 
+// A diamond burr pressed with 2 N onto the bar for a second, and a second after it.
+template <class F>
+void press(HeatReader& heat, F&& after_each) {
+  TickRecord r;
+  r.device.position_mm = {-4, 0, 5.6F};
+  r.device.tool = static_cast<std::uint8_t>(burr_index(BurrKind::diamond, 4));
+  r.force_n = {0, 0, 2};
+  for (std::uint64_t t = 0; t < 2000; ++t) {
+    r.tick = t;
+    r.normal_force_n = t < 1000 ? 2 : 0;
+    r.speed_rpm = 40000;
+    heat.tick(r, {});
+    after_each();
+  }
+}
+
+TEST(HeatReader, HistoryKeepsTheHighestOfEachPlace) {
+  const StructureMap balls = test::structure_map(
+      [](Vec3 p) -> std::uint8_t {
+        return length(p - Vec3{-4, 0, 1}) < 1.5 ? 1 : 0;
+      },
+      {{1, "near", {}}}, 0.5, 32);
+  const World world(test::bar(0.5, 0.2));
+  HeatReader none(world, &balls, 1000);
+  press(none, [] {});
+  EXPECT_FALSE(none.warmest_left());
+  EXPECT_TRUE(none.courses().empty());
+  EXPECT_EQ(none.peak_c_at({-4, 0, 3.4}), 37);
+  HeatReader heat(world, &balls, 1000);
+  heat.keep_history();
+  press(heat, [] {});
+  EXPECT_EQ(heat.hottest_c(), none.hottest_c()) << "keeping it changes nothing";
+  const auto warmest = heat.warmest_left();
+  ASSERT_TRUE(warmest);
+  EXPECT_GT(warmest->peak_c, 50);
+  EXPECT_LE(warmest->peak_c, heat.hottest_c());
+  EXPECT_LT(length(warmest->at_mm - Vec3{-4, 0, 3.6}), 1.5);
+  // What was there at any time, seen from outside.
+  HeatReader again(world, &balls, 1000);
+  double highest = 0, deeper = 0;
+  const Vec3 below = warmest->at_mm - world.bodies()[0].body->bone.frame().direction.column[2] * 1.5;  // a cell's centre too
+  press(again, [&] {
+    highest = std::max(highest, again.celsius_at(warmest->at_mm));
+    deeper = std::max(deeper, again.celsius_at(below));
+  });
+  EXPECT_NEAR(warmest->peak_c, highest, 1e-9);
+  EXPECT_NEAR(heat.peak_c_at(warmest->at_mm), highest, 1e-9);
+  EXPECT_NEAR(heat.peak_c_at(below), deeper, 1e-9);
+  EXPECT_GT(deeper, 38);
+  EXPECT_LT(again.celsius_at(warmest->at_mm), highest - 5) << "it has cooled since: the highest is no longer there to be read";
+  ASSERT_TRUE(heat.courses().contains(1));
+  const auto& course = heat.courses().at(1);
+  EXPECT_EQ(course.size(), heat.steps());
+  EXPECT_NEAR(static_cast<double>(heat.steps()) * heat.step_s(), 2, heat.step_s());
+  EXPECT_EQ(*std::max_element(course.begin(), course.end()), heat.structures().at(1).worst.peak_c);
+  EXPECT_EQ(course.back(), heat.structures().at(1).now_c);
+  EXPECT_NEAR(heat.bone_at({0, 0, 0}), 1, 1e-6);
+  EXPECT_EQ(heat.bone_at({0, 0, 9}), 0);
+}
+
 // Bone that is cut, taken apart and put together again while it is warm.
 TEST(HeatReader, CutsAndUndo) {
   const Drilled cut = run(true,

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,6 +59,24 @@ class HeatReader final : public Reader {
   [[nodiscard]] HeatLedger ledger() const;                       ///< over all bodies, also those that are gone
   [[nodiscard]] double stored_j() const;
   [[nodiscard]] std::size_t warm_bricks() const;
+
+  /// From now on: the highest temperature that each cell has, and the course of each structure. Before the first tick. Nothing of it
+  /// without this. Memory: 4 KB for each 8^3 cells that were ever warm, 8 bytes a step and structure. Forgotten where ticks are lost.
+  void keep_history();
+  /// Of the bone that is still there, linear between the centres of its cells; the body's where none was warm, or nothing is kept.
+  [[nodiscard]] double peak_c_at(Vec3 world_mm) const;
+  /// Share of bone of the voxel at a point of the world, as of the tick reached.
+  [[nodiscard]] double bone_at(Vec3 world_mm) const;
+  struct Warmest {
+    Vec3 at_mm;
+    double peak_c = 0;
+  };
+  /// Of cells that still hold at least half of their bone; none where no such cell was warm.
+  [[nodiscard]] std::optional<Warmest> warmest_left() const;
+  /// The warmest place of each structure after each step (step_s() apart), C, by value in the label map: of those whose face became warm.
+  [[nodiscard]] const std::map<std::uint8_t, std::vector<double>>& courses() const { return courses_; }
+  [[nodiscard]] std::uint64_t steps() const { return steps_; }  ///< that the history tells of
+
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
   [[nodiscard]] double step_s() const { return static_cast<double>(every_) / rate_hz_; }
 
@@ -76,6 +95,7 @@ class HeatReader final : public Reader {
   void heat(const TickRecord& record);
   void cool(Vec3 at_mm, double radius_mm, double share);
   void step();
+  void keep_course();
 
   double rate_hz_;
   HeatOfCutting params_;
@@ -94,6 +114,9 @@ class HeatReader final : public Reader {
     double now_c;
   };
   std::vector<Place> places_;
+  bool history_ = false;
+  std::uint64_t steps_ = 0;
+  std::map<std::uint8_t, std::vector<double>> courses_;
 };
 
 /// What it found, a line each: warmest bone and where its heat went; each structure that became warm; none at risk. For people.
