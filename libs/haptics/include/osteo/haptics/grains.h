@@ -24,7 +24,7 @@ class Grains {
 
   /// Takes over what is known of another bone of the same grid that this one came out of by sawing, taking apart or putting together.
   /// Voxels that have more bone than there count as untouched. Not in the servo, and while nobody writes either bone or `known`.
-  /// O(voxels), bricks that both bones share several times faster.
+  /// O(voxels).
   void inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known);
 
   /// A hand's burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked
