@@ -37,8 +37,12 @@ Grains::Grains(const BrickGrid& bone) {
   parts_ = h < kFineMm ? 1 : h < kCoarseMm ? 2 : 4;
   words_ = parts_ * parts_ * parts_;
   before_.resize(voxels);
-  for (std::size_t v = 0; v < voxels; ++v)
-    before_[v] = static_cast<std::uint8_t>(std::clamp(bone.value(static_cast<VoxelKey>(v)), 0.0F, 1.0F) * 255 + 0.5F);
+  for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+    const float* const is = bone.values_of_brick(brick);
+    std::uint8_t* const before = &before_[std::size_t{brick} * BrickGrid::kVoxels];
+    for (std::size_t n = 0; n < BrickGrid::kVoxels; ++n)
+      before[n] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(is[n], 0.0F), 1.0F) * 255 + 0.5F));
+  }
   covered_.resize((voxels + 63) / 64);
   // Twice as much as the burr's traces over 80 cm2 of bone need, or as a small piece has voxels.
   slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, (std::size_t{1} << 21) >> (parts_ == 1 ? 1 : parts_ == 2 ? 3 : 6)));
@@ -48,25 +52,49 @@ Grains::Grains(const BrickGrid& bone) {
 void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known) {
   const Frame &a = bone.frame(), &b = from.frame();
   if (a.spacing_mm != b.spacing_mm || a.origin_mm != b.origin_mm || a.direction != b.direction) return;
+  // In order of their voxels, which is that of both bones: they come in the same order whatever their places in the table.
+  std::vector<std::uint32_t> begun;
+  begun.reserve(known.used_);
+  for (std::uint32_t s = 0; s < known.slots_.size(); ++s) {
+    if (known.slots_[s].voxel != BrickGrid::kNone) begun.push_back(s);
+  }
+  std::sort(begun.begin(), begun.end(), [&](std::uint32_t x, std::uint32_t y) { return known.slots_[x].voxel < known.slots_[y].voxel; });
+  auto next = begun.begin();
+  // What a saw takes it takes alike of all that is in the voxel.
+  const auto kept = [](float is, float was) { return was > 0 ? is / was : 1.0F; };
   for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
     const Ijk at = bone.brick_coordinate(brick);
     const std::uint32_t there = from.find_brick(at.i, at.j, at.k);
     if (there == BrickGrid::kNone) continue;
-    for (std::uint32_t n = 0; n < BrickGrid::kVoxels; ++n) {
-      const VoxelKey voxel = brick * BrickGrid::kVoxels + n, old = there * BrickGrid::kVoxels + n;
-      const float is = bone.value(voxel), was = from.value(old);
-      if (is > was) continue;
-      // What a saw takes it takes alike of all that is in the voxel.
-      const float kept = was > 0 ? is / was : 1.0F;
-      before_[voxel] = std::max(before_[voxel], static_cast<std::uint8_t>(static_cast<float>(known.before_[old]) * kept + 0.5F));
-      if (is <= 0) continue;
-      if ((known.covered_[old / 64] >> (old % 64) & 1) != 0) covered_[voxel / 64] |= std::uint64_t{1} << (voxel % 64);
-      const std::size_t from_slot = known.find(old);
-      if (known.slots_[from_slot].voxel != old || used_ >= room()) continue;
+    const float *const is = bone.values_of_brick(brick), *const was = from.values_of_brick(there);
+    const VoxelKey first = brick * BrickGrid::kVoxels, old = there * BrickGrid::kVoxels;
+    std::uint8_t* const before = &before_[first];
+    const std::uint8_t* const known_before = &known.before_[old];
+    if (is == was) {
+      for (std::size_t n = 0; n < BrickGrid::kVoxels; ++n) before[n] = std::max(before[n], known_before[n]);
+    } else {
+      for (std::size_t n = 0; n < BrickGrid::kVoxels; ++n) {
+        if (is[n] > was[n]) continue;
+        before[n] = std::max(before[n], static_cast<std::uint8_t>(static_cast<float>(known_before[n]) * kept(is[n], was[n]) + 0.5F));
+      }
+    }
+    for (std::uint32_t word = 0; word < BrickGrid::kVoxels / 64; ++word) {
+      for (std::uint64_t bits = known.covered_[old / 64 + word]; bits != 0; bits &= bits - 1) {
+        const std::uint32_t n = word * 64 + static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (is[n] > was[n] || is[n] <= 0) continue;
+        covered_[first / 64 + word] |= bits & (~bits + 1);
+      }
+    }
+    while (next != begun.end() && known.slots_[*next].voxel < old) ++next;
+    for (; next != begun.end() && known.slots_[*next].voxel - old < BrickGrid::kVoxels; ++next) {
+      const Slot& s = known.slots_[*next];
+      const std::uint32_t n = s.voxel - old;
+      if (is[n] > was[n] || is[n] <= 0 || used_ >= room()) continue;
+      const VoxelKey voxel = first + n;
       const std::size_t slot = find(voxel);
       if (slots_[slot].voxel == voxel) continue;
-      slots_[slot] = {voxel, known.slots_[from_slot].grain * kept, known.slots_[from_slot].left};
-      std::copy_n(&known.grains_[from_slot * words_], words_, &grains_[slot * words_]);
+      slots_[slot] = {voxel, s.grain * kept(is[n], was[n]), s.left};
+      std::copy_n(&known.grains_[std::size_t{*next} * words_], words_, &grains_[slot * words_]);
       ++used_;
     }
   }

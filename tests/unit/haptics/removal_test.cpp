@@ -221,6 +221,33 @@ TEST(Grains, GoOnInWhatBecomesOfABone) {
   EXPECT_EQ(reach(next, after, back, 9), 1.0F);
 }
 
+// Bricks that both bones have are taken over as a whole: nothing else comes of it than voxel by voxel.
+TEST(Grains, GoOnAlikeInSharedBricksAndInCopies) {
+  auto bone = block(0.5, {{0, 0, 1}, 0.0});
+  Grains grains(bone);
+  const RoundCone ball{0, 0, 2, 2};
+  const auto voxels = static_cast<VoxelKey>(bone.brick_count() * BrickGrid::kVoxels);
+  const auto place = [&](Grains& g, const BrickGrid& b, double lift) {
+    g.place(b, ball, b.frame().world_from_index({4, 4, 2}) + Vec3{0, 0, lift}, {0, 0, 1}, true);
+  };
+  place(grains, bone, 0);
+  for (VoxelKey v = 0; v < voxels; ++v) bone.set(v, std::min(bone.value(v), grains.reach(bone, v)));
+  const BrickGrid shared = bone.sharing(), copy(bone);
+  ASSERT_TRUE(shared.shares_brick(0, bone, 0));
+  ASSERT_FALSE(copy.shares_brick(0, bone, 0));
+  Grains in_shared(shared), in_copy(copy);
+  in_shared.inherit(shared, bone, grains);
+  in_copy.inherit(copy, bone, grains);
+  EXPECT_EQ(in_shared.used(), grains.used());
+  EXPECT_EQ(in_copy.used(), grains.used());
+  for (Grains* const g : {&grains, &in_shared, &in_copy}) place(*g, bone, 0.7);
+  for (VoxelKey v = 0; v < voxels; ++v) {
+    const float expected = grains.reach(bone, v);
+    ASSERT_EQ(in_shared.reach(shared, v), expected) << v;
+    ASSERT_EQ(in_copy.reach(copy, v), expected) << v;
+  }
+}
+
 // Through a saw cut far off, taking apart and undoing both, what the burr has covered stays known.
 TEST(Removal, WhereTheBurrHasBeenOutlivesSawSplitAndUndo) {
   World world(block(0.5, {}));

@@ -19,11 +19,12 @@ namespace osteo {
 /// room() voxels that the burr has covered in part. All of it is made at once; the rest neither allocates nor locks.
 class Grains {
  public:
-  /// `bone` as nobody has drilled it yet; as large as it is when used.
+  /// `bone` as nobody has drilled it yet, as large as it is when used; nobody writes it meanwhile.
   explicit Grains(const BrickGrid& bone);
 
   /// Takes over what is known of another bone of the same grid that this one came out of by sawing, taking apart or putting together.
-  /// Voxels that have more bone than there count as untouched. Not in the servo.
+  /// Voxels that have more bone than there count as untouched. Not in the servo, and while nobody writes either bone or `known`.
+  /// O(voxels).
   void inherit(const BrickGrid& bone, const BrickGrid& from, const Grains& known);
 
   /// A hand's burr turns here from now on. `start_mm`, `axis`: of the head, in the bone's frame. `every`: each voxel asked for is looked
