@@ -39,7 +39,7 @@ const std::map<std::string, std::set<std::string>>& flags_of_actions() {
       {"order", {}},
       {"form", {"rater"}},
       {"rate", {}},
-      {"analyse", {"out", "resamples", "level"}},
+      {"analyse", {"out", "resamples", "level", "given"}},
       {"demo", {"out", "resamples", "level", "no_movies"}},
   };
   return flags;
@@ -161,7 +161,7 @@ int StudyCommand::run(const Params& p, cli::Invocation& io) {
     said = sheet.rater + ": ratings of " + std::to_string(sheet.sessions.size()) + " sessions taken";
   } else {
     const study::Study study = study::read_study(folder);
-    const study::Analysis analysis = study::analyse(study, {p.level, p.resamples});
+    const study::Analysis analysis = study::analyse(study, {p.level, p.resamples, names_in(p.given)});
     const std::string base = p.out.empty() ? (folder / "report").string() : p.out;
     // The report follows from the folder; one that is there is replaced, as that of a case is, unless it was put elsewhere.
     const bool replace = p.out.empty() || io.common.force;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include <Eigen/Dense>
+
 #include "check.h"
 #include "distributions.h"
 
@@ -39,7 +41,75 @@ double p_of(double r, std::size_t n) {
   return student_p(r * std::sqrt(df / ((1 - r) * (1 + r))), df);
 }
 
+double norm_of(std::span<const double> x) {
+  double sum = 0;
+  for (const double v : x) sum += v * v;
+  return std::sqrt(sum);
+}
+
+// What a straight line through `given` leaves of x. Empty where one of those follows from the others.
+std::vector<double> left_of(std::span<const double> x, std::span<const std::vector<double>> given) {
+  const auto n = static_cast<Eigen::Index>(x.size());
+  Eigen::MatrixXd a(n, static_cast<Eigen::Index>(given.size()) + 1);
+  a.col(0).setOnes();
+  for (std::size_t k = 0; k < given.size(); ++k) {
+    // Centred and of one size, so that units say nothing about what follows from what.
+    auto column = a.col(static_cast<Eigen::Index>(k) + 1);
+    const double middle = mean(given[k]);
+    for (Eigen::Index i = 0; i < n; ++i) column[i] = given[k][static_cast<std::size_t>(i)] - middle;
+    const double size = column.norm();
+    if (size <= 1e-14 * norm_of(given[k])) return {};
+    column *= std::sqrt(static_cast<double>(n)) / size;
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
+  // A column that the others explain to ten digits says nothing of its own.
+  const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
+  if (diagonal.minCoeff() <= 1e-10 * diagonal.maxCoeff()) return {};
+  const Eigen::Map<const Eigen::VectorXd> v(x.data(), n);
+  const Eigen::VectorXd rest = v - a * qr.solve(v);
+  if (rest.norm() <= 1e-12 * v.norm()) return {};
+  return {rest.begin(), rest.end()};
+}
+
+Correlation partial(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given, double level) {
+  need_pairs(x, y);
+  need_level(level);
+  for (const auto& g : given) {
+    need_same_size(x.size(), g.size());
+    need_finite(g, "a list given");
+  }
+  Correlation c;
+  c.n = x.size();
+  const std::size_t k = given.size();
+  if (c.n < k + 3) return c;
+  const std::vector<double> a = left_of(x, given), b = left_of(y, given);
+  if (a.empty() || b.empty()) return c;
+  c.r = product_moment(a, b);
+  c.p = p_of(c.r, c.n - k);
+  if (std::isfinite(c.r) && c.n > k + 3) {
+    const double half = normal_quantile(0.5 + level / 2) / std::sqrt(static_cast<double>(c.n - k) - 3), z = std::atanh(c.r);
+    c.interval = {std::tanh(z - half), std::tanh(z + half)};
+  }
+  return c;
+}
+
 }  // namespace
+
+Correlation partial_pearson(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given,
+                            double level) {
+  return partial(x, y, given, level);
+}
+
+Correlation partial_spearman(std::span<const double> x, std::span<const double> y, std::span<const std::vector<double>> given,
+                             double level) {
+  need_pairs(x, y);
+  std::vector<std::vector<double>> of;
+  for (const auto& g : given) {
+    need_finite(g, "a list given");
+    of.push_back(ranks(g));
+  }
+  return partial(ranks(x), ranks(y), of, level);
+}
 
 Correlation pearson(std::span<const double> x, std::span<const double> y, double level) {
   need_pairs(x, y);

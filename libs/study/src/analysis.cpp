@@ -136,6 +136,12 @@ void Analyst::closing() {
 Analysis analyse(const Study& study, const AnalysisSettings& settings) {
   if (!(settings.level > 0 && settings.level < 1)) throw Error(ExitCode::usage, "the level of intervals lies between 0 and 1");
   if (settings.resamples < 100) throw Error(ExitCode::usage, "a bootstrap of fewer than 100 resamples says nothing");
+  for (const std::string& g : settings.given) {
+    if (std::find(study.metrics.begin(), study.metrics.end(), g) != study.metrics.end()) continue;
+    const std::string near = nearest_name(g, study.metrics);
+    throw Error(ExitCode::usage, "'" + g + "' is no metric of this study",
+                near.empty() ? "sessions.csv has one a column" : "did you mean '" + near + "'?");
+  }
   return Analyst(study, settings).run();
 }
 

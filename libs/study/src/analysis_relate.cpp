@@ -81,6 +81,35 @@ void Analyst::agreement() {
   add_charts(std::move(charts), "Each dot a session (equal ones side by side); red: mean difference and limits of agreement (1.96 SD).");
 }
 
+// The correlation without what the metrics given explain of both, of sessions that have all of them.
+void Analyst::hold(const Outcome& metric, const Outcome& rating, std::vector<sheet::Cell>& row) {
+  Json& j = json_["correlations"].back();
+  j["given"] = Json(settings_.given);
+  std::vector<double> x, y;
+  std::vector<std::vector<double>> given(settings_.given.size());
+  for (std::size_t i = 0; i < metric.session.size(); ++i) {
+    const auto rated = std::find(rating.session.begin(), rating.session.end(), metric.session[i]);
+    if (rated == rating.session.end()) continue;
+    const auto& has = study_.sessions[metric.session[i]].metrics;
+    if (!std::all_of(settings_.given.begin(), settings_.given.end(), [&](const std::string& g) { return has.contains(g); })) continue;
+    x.push_back(metric.values[i]);
+    y.push_back(rating.values[static_cast<std::size_t>(rated - rating.session.begin())]);
+    for (std::size_t g = 0; g < given.size(); ++g) given[g].push_back(has.at(settings_.given[g]));
+  }
+  const Correlation p = partial_pearson(x, y, given, settings_.level), s = partial_spearman(x, y, given, settings_.level);
+  const auto told = [](const Correlation& c) { return Json{{"value", c.r}, {"p", c.p}, {"interval", json_of(c.interval)}}; };
+  j["sessions_with_all"] = x.size();
+  j["partial_pearson"] = told(p);
+  j["partial_spearman"] = told(s);
+  if (std::isnan(p.r))
+    refuse("Partial correlation of " + metric.name,
+           std::find(settings_.given.begin(), settings_.given.end(), metric.name) != settings_.given.end()
+               ? "It is among what is held."
+               : counted(x.size(), "session has", "sessions have") +
+                     " all of it, or what is held leaves nothing, or follows from each other.");
+  row.insert(row.end(), {{std::to_string(x.size())}, {with({p.r, p.interval})}, {with({s.r, s.interval})}});
+}
+
 void Analyst::correlate() {
   json_["correlations"] = Json::list();
   add(sheet::Heading{"Do metrics follow the ratings?"});
@@ -90,7 +119,9 @@ void Analyst::correlate() {
     refuse("Correlation", rating == nullptr ? "There are no ratings." : "There are no metrics.");
     return;
   }
+  const bool holds = !settings_.given.empty();
   sheet::Table table{{"metric", "sessions", "people", "Pearson r", "R squared", "Spearman rho"}, {}, {}};
+  if (holds) table.head.insert(table.head.end(), {"sessions, held", "r, held", "rho, held"});
   const std::vector<int> raters_people = people_of(*rating);
   std::vector<sheet::Plot> charts;
   for (const Outcome& o : outcomes_) {
@@ -134,12 +165,21 @@ void Analyst::correlate() {
                           {with({c.pearson.r, c.pearson_by_people.interval})},
                           {text(c.pearson.r * c.pearson.r, 2)},
                           {with({c.spearman.r, c.spearman_by_people.interval})}});
+    if (holds) hold(o, *rating, table.rows.back());
     if (charts.size() < kMostCharts)
       charts.push_back(scatter_chart("scatter-" + std::to_string(charts.size() + 1), o.name, rating->name, x, y, able, settings_.level));
   }
   if (table.rows.empty()) return;
   add(std::move(table));
   say("With " + rating->name + "; intervals by drawing people, with all their sessions.", Tone::quiet);
+  if (holds) {
+    std::string names;
+    for (const std::string& g : settings_.given) names += (names.empty() ? "" : ", ") + g;
+    say("Held (partial correlation, by straight lines): " + names +
+            ". Intervals by Fisher's transformation, as if sessions knew nothing of each other: too narrow where people come several "
+            "times.",
+        Tone::quiet);
+  }
   add_charts(std::move(charts),
              "Full dots: sessions of " + study_.plan.competent +
                  ", hollow ones: of others. Red: least squares; the band is the line's t interval as if sessions knew nothing of "

@@ -101,6 +101,7 @@ class Analyst {
   [[nodiscard]] Json mixed(const Outcome& o, const std::string& first, const std::string& second) const;
   void repeated_table();
   void correlate();
+  void hold(const Outcome& metric, const Outcome& rating, std::vector<sheet::Cell>& row);
   void decide();
   void power();
   void closing();

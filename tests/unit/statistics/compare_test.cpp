@@ -157,6 +157,40 @@ TEST(Correlation, OfWhatDoesNotVaryOrVariesWholly) {
   EXPECT_THROW(static_cast<void>(pearson(x, std::vector<double>{1})), Error);
 }
 
+TEST(Correlation, WithOthersHeldAsPingouin) {
+  const Json r = reference("partial_correlation");
+  const auto x = numbers(r, "x"), y = numbers(r, "y");
+  const std::vector<std::vector<double>> both{numbers(r, "first"), numbers(r, "second")};
+  const auto all_of = [](const Correlation& c) { return std::vector<double>{c.r, c.p, c.interval.lo, c.interval.hi}; };
+  expect_same(all_of(partial_pearson(x, y, std::span(both).first(1))), numbers(r, "pearson_one"));
+  expect_same(all_of(partial_pearson(x, y, both)), numbers(r, "pearson_two"));
+  expect_same(all_of(partial_spearman(x, y, both)), numbers(r, "spearman_two"));
+  // Nothing held: the plain one.
+  const Correlation plain = pearson(x, y);
+  expect_same(all_of(partial_pearson(x, y, {})), all_of(plain));
+  // In other units it is the same.
+  std::vector<std::vector<double>> scaled = both;
+  for (double& v : scaled[1]) v = 1e6 * v - 3e8;
+  expect_same({partial_pearson(x, y, scaled).r}, {partial_pearson(x, y, both).r});
+}
+
+TEST(Correlation, WhatIsHeldMayLeaveNothing) {
+  const std::vector<double> x{1, 2, 3, 4, 5, 7}, y{2, 1, 4, 3, 6, 5}, same(6, 0.1);
+  const auto just = [](std::vector<double> v) { return std::vector<std::vector<double>>{std::move(v)}; };
+  std::vector<double> of_x = x;
+  for (double& v : of_x) v = 3 * v + 1;
+  EXPECT_TRUE(std::isnan(partial_pearson(x, y, just(of_x)).r)) << "x itself is held";
+  EXPECT_TRUE(std::isnan(partial_pearson(x, y, just(same)).r)) << "a list that never varies";
+  std::vector<double> twice = y;
+  for (double& v : twice) v *= 2;
+  const std::vector<double> other{5, 1, 2, 8, 3, 4};
+  EXPECT_TRUE(std::isnan(partial_pearson(x, other, std::vector<std::vector<double>>{y, twice}).r)) << "one follows from the other";
+  EXPECT_TRUE(std::isnan(partial_pearson(std::span(x).first(3), std::span(y).first(3), just({1, 5, 2})).r));
+  EXPECT_TRUE(std::isfinite(partial_pearson(x, y, just(other)).r));
+  EXPECT_THROW(static_cast<void>(partial_pearson(x, y, just({1, 2}))), Error);
+  EXPECT_THROW(static_cast<void>(partial_spearman(x, y, just(std::vector<double>(6, kUndefined)))), Error);
+}
+
 // Twenty sessions of four people who differ: the interval knows that there are four.
 TEST(Correlation, PeopleNotSessionsAreDrawn) {
   Random random(4);

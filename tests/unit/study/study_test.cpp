@@ -312,6 +312,35 @@ TEST(Analyse, AllRatingsEqual) {
   EXPECT_FALSE(sheet_pdf(a.sheet).empty());
 }
 
+// The metric "echo" follows the ratings only because "seconds" does: once that is held, little is left.
+TEST(Analyse, WhatIsHeldIsTakenAway) {
+  Study s = example(12);
+  s.metrics.push_back("echo");
+  statistics::Random random(11);
+  for (Session& one : s.sessions) one.metrics["echo"] = one.metrics["seconds"] + 40 * random.normal();
+  s.sessions[5].metrics.erase("seconds");
+  const Analysis plain = analyse(s, {0.95, 200}), a = analyse(s, {0.95, 200, {"seconds"}});
+  const auto of = [](const Analysis& from, std::string_view metric) -> const Json& {
+    for (const Json& c : from.json.find("correlations")->items())
+      if (*c.find("metric")->text() == metric) return c;
+    throw Error(ExitCode::failed, "no such correlation");
+  };
+  EXPECT_EQ(of(plain, "echo").find("partial_pearson"), nullptr);
+  const Json &echo = of(a, "echo"), &own = of(a, "seconds");
+  EXPECT_LT(number(echo, {"pearson", "value"}), -0.6);
+  EXPECT_LT(std::abs(number(echo, {"partial_pearson", "value"})), 0.3);
+  EXPECT_LT(std::abs(number(echo, {"partial_spearman", "value"})), 0.35);
+  EXPECT_EQ(number(echo, {"sessions_with_all"}), number(echo, {"sessions"}) - 1);
+  EXPECT_GT(number(echo, {"partial_pearson", "p"}), 0.01);
+  // The other way round the cause keeps what it says.
+  EXPECT_LT(number(of(analyse(s, {0.95, 200, {"echo"}}), "seconds"), {"partial_pearson", "value"}), -0.4);
+  EXPECT_TRUE(std::isnan(number(own, {"partial_pearson", "value"})));
+  EXPECT_TRUE(refused(a, "Partial correlation of seconds", "among what is held"));
+  EXPECT_NE(sheet_html(a.sheet).find("r, held"), std::string::npos);
+  EXPECT_EQ(sheet_html(plain.sheet).find("held"), std::string::npos);
+  EXPECT_NE(message_of([&] { static_cast<void>(analyse(s, {0.95, 200, {"second"}})); }).find("'second' is no metric"), std::string::npos);
+}
+
 TEST(Analyse, MissingRatingsAndMetrics) {
   Study s = example(5, 3);
   s.raters[0].sessions.erase("B0");
