@@ -124,7 +124,7 @@ _osteo() {
     send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dry-run --check --deidentify --key" ;;
     fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --out --study --series --accession --patient-id --date --modality --series-gb" ;;
     receive) flags="$flags --ae --bind --port --allow --anybody --associations --object-gb --folder-gb --keep-free-gb --memory-mb --timeout-s --association-s --quiet-s --metrics --tls-ca --tls-certificate --tls-key" ;;
-    watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --once --no-report --metrics" ;;
+    watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --orthanc --orthanc-login --orthanc-ca --timeout-s --object-gb --once --no-report --metrics" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;

@@ -1,6 +1,6 @@
 """send, fetch and receive against programs nobody here wrote: Orthanc, DCMTK's storescu and echoscu; then against peers that lie.
-usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, tls or units"""
-import contextlib, json, os, pathlib, shutil, signal, socket, struct, subprocess, sys, time, urllib.request, warnings
+usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, doors, tls or units"""
+import base64, contextlib, http.server, json, os, pathlib, shutil, signal, socket, struct, subprocess, sys, threading, time, urllib.request, warnings
 
 if missing := [p for p in ("Orthanc", "storescu", "echoscu", "openssl") if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin")]:
     print(f"skipped: {', '.join(missing)} not installed (Debian: orthanc, dcmtk, openssl)")
@@ -80,25 +80,28 @@ def ct_series(ask):
 
 
 @contextlib.contextmanager
-def orthanc(dicom, http, receiver_port):
+def orthanc(dicom, http, receiver_port, login=None):
     folder = work / "orthanc"
     config = {"StorageDirectory": str(folder), "IndexDirectory": str(folder), "HttpPort": http, "DicomPort": dicom, "DicomAet": "ORTHANC",
               "RemoteAccessAllowed": False, "AuthenticationEnabled": False, "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": False,
               "DicomAlwaysAllowEcho": False, "DicomAlwaysAllowFind": False, "DicomAlwaysAllowGet": False, "Plugins": [],
               "DicomModalities": {"osteotome": {"AET": "OSTEOTOME", "Host": "127.0.0.1", "Port": receiver_port, "AllowEcho": True, "AllowFind": True,
                                                 "AllowGet": True, "AllowMove": True, "AllowStore": True}}}
+    if login:
+        config |= {"AuthenticationEnabled": True, "RegisteredUsers": dict([login.split(":")]), "StableAge": 1}
+    headers = {"Authorization": "Basic " + base64.b64encode(login.encode()).decode()} if login else {}
     (work / "orthanc.json").write_text(json.dumps(config))
     with open(work / "orthanc.log", "w") as log:
         process = subprocess.Popen(["Orthanc", "orthanc.json"], stdout=log, stderr=log)
         try:
             def up():
                 try:
-                    return urllib.request.urlopen(f"http://127.0.0.1:{http}/system", timeout=5).status == 200
+                    return urllib.request.urlopen(urllib.request.Request(f"http://127.0.0.1:{http}/system", headers=headers), timeout=5).status == 200
                 except OSError:
                     return False
             until(up)
             yield lambda path, data=None: json.load(urllib.request.urlopen(
-                urllib.request.Request(f"http://127.0.0.1:{http}{path}", data=None if data is None else json.dumps(data).encode()), timeout=120))
+                urllib.request.Request(f"http://127.0.0.1:{http}{path}", data=None if data is None else data if isinstance(data, bytes) else json.dumps(data).encode(), headers=headers), timeout=120))
         finally:
             process.terminate()
             process.wait(60)
@@ -409,6 +412,175 @@ def watch():
         assert not any(word in path.read_text() for word in ("WATCHED", "1.2.3.", "Petrous")), path
 
 
+def doors():
+    """watch --orthanc: against Orthanc with a password, then against a server that lies."""
+    files = make_scan()
+    warnings.simplefilter("ignore")
+    rules = {"osteotome_rules": 1, "rules": [{"name": "ear", "modality": "CT", "any_of": ["petrous"], "least_objects": 5, "set": {"spacing_mm": "3", "lower": "300"}}]}
+    (work / "rules.json").write_text(json.dumps(rules))
+
+    def objects(uid, of=files, modality="CT", own=False):
+        for path in of:
+            d = pydicom.dcmread(path)
+            d.SeriesInstanceUID, d.Modality = uid, modality
+            if not own:
+                d.SeriesDescription, d.Manufacturer = "Petrous bone", "SOMEBODY"
+            d.SOPInstanceUID = d.file_meta.MediaStorageSOPInstanceUID = f"{uid}.{d.InstanceNumber}"
+            d.PatientName = "WATCHED^PERSON"
+            d.save_as("one.dcm", enforce_file_format=True)
+            yield (work / "one.dcm").read_bytes()
+
+    secret = "watcher:tell-nobody"
+    (work / "login").write_text(secret + "\n")
+    (work / "login").chmod(0o600)
+    (work / "open").write_text(secret)
+    (work / "open").chmod(0o644)
+    (work / "bad").write_text("watcher:wrong")
+    (work / "bad").chmod(0o600)
+    dicom, http_port = free_port(), free_port()
+    url = f"http://127.0.0.1:{http_port}"
+    line = lambda folder, out, address=url, login="login": [osteo, "watch", work / folder, "--rules", "rules.json", "-o", work / out, "--orthanc", address, "--orthanc-login", login,
+                                                            "--quiet-s", "0.5", "--poll-s", "0.2", "--json", "--no-report", "--keep-free-mb", "0", "--timeout-s", "2"]
+    said = []
+
+    def events(*a, rc=0, more=(), **k):
+        r = run(*line(*a, **k), "--once", *more, rc=rc)
+        said.append(r.stdout + r.stderr)
+        return [json.loads(text) for text in r.stdout.splitlines()] if rc == 0 else [], r.stdout + r.stderr
+    what = lambda told: sorted(e["what"] for e in told)
+    # What is wrong is told before anything is made.
+    for address, login, word in (("ftp://x", "login", "http"), ("http://a:b@127.0.0.1:1", "login", "user"), ("http://example.org", "login", "in the clear"), (url, "open", "others can read"),
+                                 ("http://", "login", "no address")):
+        r = run(*line("x", "y", address, login), "--once", rc=2)
+        assert word in r.stderr and "a:b" not in r.stderr and not (work / "x").exists() and not (work / "y").exists(), r.stderr
+    for pair in (("x", "x"), ("x", "x/y"), ("x/y", "x")):
+        assert "may not lie in" in run(*line(*pair), "--once", rc=2).stderr and not (work / "x").exists(), pair
+    run(*line("ct", "y"), "--once", rc=6)
+    # Nobody there: told, and once means once.
+    assert "Could" in events("spool", "cases", rc=7)[1] or "connect" in said[-1], said[-1]
+    with orthanc(dicom, http_port, free_port(), secret) as ask:
+        def store(*a, **k):
+            for data in objects(*a, **k):
+                ask("/instances", data)
+        stable = lambda: [c for c in ask("/changes?limit=1000")["Changes"] if c["ChangeType"] == "StableSeries"]
+        assert "refuses the login" in events("spool", "cases", login="bad", rc=7)[1]
+        store("1.2.3.1", of=files[:-1])
+        store("1.2.3.2", of=files[:1], own=True)
+        store("1.2.3.3", of=files[:1], modality="MG")
+        until(lambda: len(stable()) == 3)
+        told, _ = events("spool", "cases")
+        assert what(told) == ["begun", "done", "unmatched"], told
+        done = next(e for e in told if e["what"] == "done")
+        assert done["objects"] == len(files) - 1
+        got = [p for p in (work / "spool").rglob("*.dcm")]
+        assert sorted(data_set(p) for p in got if len(list(p.parent.iterdir())) > 1) == sorted(
+            ask_bytes(http_port, secret, i) for i in ask(f"/series/{ct_series_of(ask, '1.2.3.1')}")["Instances"]), "bit for bit"
+        assert (work / "spool").stat().st_mode & 0o77 == 0 and all(p.stat().st_mode & 0o77 == 0 for p in got)
+        assert "begun" not in what(events("spool", "cases")[0]), "once"
+        # A late slice: all of the series again, into a case of its own.
+        store("1.2.3.1", of=files[-1:])
+        until(lambda: any(c["Seq"] > json.loads((work / "spool" / ".orthanc.json").read_text())["last"] for c in stable()))
+        again = next(e for e in events("spool", "cases")[0] if e["what"] == "done")
+        assert again["case"] == done["case"] + "-2" and again["objects"] == len(files), again
+        # Killed while it fetches or runs, and started again: one case of it.
+        store("1.2.3.4")
+        last = json.loads((work / "spool" / ".orthanc.json").read_text())["last"]
+        until(lambda: any(c["Seq"] > last for c in stable()))
+        for wait in (0.05, 0.15, 0.3, 0.6):
+            with subprocess.Popen([str(a) for a in line("spool", "cases")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as watcher:
+                time.sleep(wait)
+                watcher.kill()
+        events("spool", "cases")
+        made = [p.name for p in (work / "cases" / "cases").iterdir() if p.is_dir() and (p / "manifest.json").exists()]
+        assert len(made) == 3 and sum(name.endswith("-2") for name in made) == 1, made
+        assert not [p for p in (work / "spool").iterdir() if p.name.startswith(".series")]
+        # The folder is this server's.
+        assert "holds the series of" in run(*line("spool", "cases", url.replace("127.0.0.1", "localhost")), "--once", rc=6).stderr
+    # The same folder before a server that was set up anew: its changes are gone through from the first.
+    shutil.rmtree(work / "orthanc")
+    with orthanc(dicom, http_port, free_port(), secret) as ask:
+        for data in objects("1.2.3.6"):
+            ask("/instances", data)
+        until(lambda: any(c["ChangeType"] == "StableSeries" for c in ask("/changes?limit=1000")["Changes"]))
+        told, err = events("spool", "cases")
+        assert "from its beginning" in err and what(told).count("done") == 1, (told, err)
+    # One that lies. What it answers, by path; it is asked again until the watcher has what it needs or gives up.
+    series, instance = "-".join(["0123abcd"] * 5), "-".join(["4567cdef"] * 5)
+    (good, *_) = objects("1.2.3.9", of=files[:1])
+    truth = {"/changes": json.dumps({"Changes": [{"ChangeType": "StableSeries", "ID": series, "Seq": 1}], "Done": True, "Last": 1}).encode(),
+             f"/series/{series}": json.dumps({"MainDicomTags": {"Modality": "CT"}}).encode(),
+             f"/series/{series}/instances": json.dumps([{"ID": instance, "FileSize": len(good)}]).encode(), f"/instances/{instance}/file": good}
+    answers = {}
+
+    class Liar(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            path = self.path.split("?")[0]
+            body = answers.get(path, truth.get(path))
+            if body == "stall":
+                time.sleep(6)
+                return
+            status, body, length = body if isinstance(body, tuple) else (200 if body is not None else 404, body or b"", None)
+            self.send_response(status)
+            self.send_header("Content-Length", str(len(body) if length is None else length))
+            if status == 302:
+                self.send_header("Location", "/changes")
+            self.end_headers()
+            with contextlib.suppress(OSError):
+                self.wfile.write(body)
+
+        def log_message(self, *a):
+            pass
+    liar = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Liar)
+    threading.Thread(target=liar.serve_forever, daemon=True).start()
+    there = f"http://127.0.0.1:{liar.server_address[1]}"
+    page = lambda changes, done=True: json.dumps({"Changes": changes, "Done": done, "Last": 1}).encode()
+    file, listed = f"/instances/{instance}/file", f"/series/{series}/instances"
+    lies = [("/changes", b"<html>"), ("/changes", b"[]"), ("/changes", page([], False)), ("/changes", page([{"ChangeType": "StableSeries", "ID": "../../system", "Seq": 1}])),
+            ("/changes", page([{"ChangeType": "StableSeries", "ID": series}])), ("/changes", page([{"ChangeType": "x", "ID": series, "Seq": s} for s in (2, 1)])),
+            ("/changes", b"[" * 100000), ("/changes", (302, b"", None)), ("/changes", (500, b"no", None)), ("/changes", "stall"), ("/changes", b" " * 65_000_000),
+            (listed, json.dumps([{"ID": "../x", "FileSize": 10}]).encode()), (listed, json.dumps([{"ID": instance, "FileSize": 1e12}]).encode()),
+            (file, good[:-9]), (file, good + b"more"), (file, bytes(len(good))), (file, (200, good[:-9], len(good))), (file, "stall")]
+    for n, (path, lie) in enumerate(lies):
+        answers.clear()
+        answers[path] = lie
+        _, err = events(f"lied-{n}", f"lied-out-{n}", there, rc=7)
+        spool = work / f"lied-{n}"
+        assert not list(spool.rglob("*.dcm")) and json.loads((spool / ".orthanc.json").read_text())["last"] in (0, 2), (n, path, err)
+        answers.clear()  # and when it has come to its senses
+        if n != 5:
+            events(f"lied-{n}", f"lied-out-{n}", there)
+            (one,) = spool.rglob("*.dcm")
+            assert one.read_bytes() == good and json.loads((spool / ".orthanc.json").read_text())["last"] == 1, n
+    # Objects that stay wrong do not hold up what comes after them.
+    answers[file] = bytes(len(good))
+    for rc in (7, 7, 0):
+        _, err = events("stubborn", "stubborn-out", there, rc=rc)
+    assert "left out" in err and json.loads((work / "stubborn" / ".orthanc.json").read_text())["last"] == 1, err
+    # Away for a while: a watcher that stays asks again.
+    answers.clear()
+    answers["/changes"] = (500, b"", None)
+    with open(work / "patient.log", "w") as log, subprocess.Popen([str(a) for a in line("patient", "patient-out", there)], stdout=subprocess.DEVNULL, stderr=log) as watcher:
+        until(lambda: "status 500" in (work / "patient.log").read_text())
+        answers.clear()
+        until(lambda: any((work / "patient").glob("series-*/*.dcm")))
+        watcher.terminate()
+    liar.shutdown()
+    # No identity and no password in journal, state and words.
+    said += [p.read_text() for p in [*(work / "cases" / "records").iterdir(), *work.glob("*/.orthanc.json"), work / "patient.log"]]
+    assert not any(word in text for text in said for word in ("tell-nobody", "WATCHED", "1.2.3.", "Petrous")), "told"
+
+
+def ct_series_of(ask, uid):
+    return next(i for i in ask("/series") if ask(f"/series/{i}")["MainDicomTags"]["SeriesInstanceUID"] == uid)
+
+
+def ask_bytes(port, login, instance):
+    """The data set of an object, as the server has it."""
+    request = urllib.request.Request(f"http://127.0.0.1:{port}/instances/{instance}/file", headers={"Authorization": "Basic " + base64.b64encode(login.encode()).decode()})
+    (work / "theirs.dcm").write_bytes(urllib.request.urlopen(request, timeout=60).read())
+    return data_set(work / "theirs.dcm")
+
+
 def tls():
     files = make_scan()
     for name, issuer in (("ca", None), ("ours", "ca"), ("node", "ca"), ("other-ca", None), ("stranger", "other-ca")):
@@ -464,5 +636,5 @@ def units():
         assert all(flag in known for flag in called if flag.startswith("--")), called
 
 
-{"orthanc": round_trip, "hostile": hostile, "watch": watch, "tls": tls, "units": units}[part]()
+{"orthanc": round_trip, "hostile": hostile, "watch": watch, "doors": doors, "tls": tls, "units": units}[part]()
 print(f"pacs {part}: all as it should be")

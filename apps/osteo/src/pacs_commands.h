@@ -117,8 +117,8 @@ struct ReceiveCommand {
 
 struct WatchCommand {
   struct Params {
-    std::string rules, out, metrics;
-    double quiet_s = 30, poll_s = 2;
+    std::string rules, out, metrics, orthanc, orthanc_login, orthanc_ca;
+    double quiet_s = 30, poll_s = 2, timeout_s = 30, object_gb = 2;
     int jobs = 1;
     double memory_mb = 4000, minutes = 60, keep_free_mb = 500;
     int retries = 1;
@@ -134,6 +134,13 @@ struct WatchCommand {
     visit({"minutes", "time that a case may take; one that needs longer is ended (0: no bound)", "min", 0, 100000}, p.minutes);
     visit({"retries", "further tries of a case that ended for memory, time or a signal", "", 0, 100}, p.retries);
     visit({"keep_free_mb", "begin no case with less free on the disk of the cases", "MB", 0, 1e9}, p.keep_free_mb);
+    visit({"orthanc", "address of an Orthanc whose series are copied into the folder, like https://orthanc.example:8042 (empty: none)"},
+          p.orthanc);
+    visit({"orthanc_login", "file, mode 600, with USER:PASSWORD (empty: OSTEO_ORTHANC_LOGIN of the environment, or none)"},
+          p.orthanc_login);
+    visit({"orthanc_ca", "certificates to trust (PEM; empty: those of the system)"}, p.orthanc_ca);
+    visit({"timeout_s", "for the connection to it, and for less than 1000 bytes a second", "s", 1, 3600}, p.timeout_s);
+    visit({"object_gb", "a series with a larger object is not taken from it", "GB", 0.000001, 100}, p.object_gb);
     visit({"once", "end when all that is there is done, instead of waiting for more"}, p.once);
     visit({"no_report", "write no report of each case: its cuts are pictures of the patient"}, p.no_report);
     visit({"metrics", "file for counters, in Prometheus' text form (empty: none)"}, p.metrics);

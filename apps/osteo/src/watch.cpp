@@ -2,10 +2,13 @@
 #include "osteo/pacs/watch.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <iostream>
 #include <ostream>
 
 #include "batch_command.h"
 #include "osteo/base/json_document.h"
+#include "osteo/pacs/orthanc.h"
 #include "osteo/pipeline/pipeline.h"
 #include "pacs_commands.h"
 #include "temporal_bone_pipeline.h"
@@ -41,8 +44,9 @@ cli::CommandInfo WatchCommand::info() {
       "a "
       "power cut, goes on where it was, and the same objects never run twice. Slices that come late run their series again, into "
       "OUT/cases/CODE-2: no case is ever replaced. Objects made by this program, and what is no CT or MR image, never run. CODE is a hash; "
-      "no name is in records or on standard output. A case that was refused or failed is tried again when more of its series comes.",
-      {{"folder", "where scans come in; nothing in it is changed"}},
+      "no name is in records or on standard output. With --orthanc, series that an Orthanc calls stable are copied into FOLDER first. A "
+      "case that was refused or failed is tried again when more of its series comes.",
+      {{"folder", "where scans come in; nothing in it is changed (with --orthanc: where its series are copied to)"}},
       "osteo watch INBOX --rules pipelines/rules.json -o CASES"};
 }
 
@@ -63,6 +67,33 @@ int WatchCommand::run(const Params& p, cli::Invocation& io) {
   o.keep_free_mb = p.keep_free_mb;
   o.once = p.once;
   o.program = std::string(program_version());
+  OrthancServer server;
+  server.url = p.orthanc;
+  server.ca = p.orthanc_ca;
+  server.timeout_s = p.timeout_s;
+  server.object_gb = p.object_gb;
+  server.keep_free_mb = p.keep_free_mb;
+  if (p.orthanc.empty()) {
+    if (!p.orthanc_login.empty() || !p.orthanc_ca.empty())
+      throw Error(ExitCode::usage, "a login or certificates for which server?", "--orthanc URL");
+  } else {
+    const char* const given = std::getenv("OSTEO_ORTHANC_LOGIN");
+    server.login = !p.orthanc_login.empty() ? read_login(p.orthanc_login) : given != nullptr ? given : "";
+    check_orthanc(server);
+    check_watch_folders(o.folder, o.out);
+    open_orthanc_folder(o.folder, server);
+    o.feed = [&] {
+      Context context = io.context;
+      context.on_log([](LogLevel, std::string_view text) { std::cerr << text << std::endl; });
+      try {
+        follow_orthanc(o.folder, server, context);
+      } catch (const Error& e) {
+        std::cerr << e.what() << (e.advice().empty() ? "" : " (" + e.advice() + ")") << std::endl;
+        return static_cast<int>(e.code());
+      }
+      return 0;
+    };
+  }
   io.end_progress();
   const WatchWork work = [&](const SeriesRule& rule, const fs::path& source, const fs::path& folder) {
     std::vector<std::string> a{"osteo",   "prepare", source.string(), "-o",     folder.string(),

@@ -23,11 +23,14 @@ namespace osteo {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::size_t kHeadsAtOnce = 2000;     // of files, in one child: some 400 kB of what it says
-constexpr std::size_t kHeads = 0;              // the child that reads them; cases count from 1
-constexpr ChildLimits kHeadLimits{1000, 600};  // MB and s: heads are read without pixels
-constexpr double kPatience = 12;               // seconds: children of a watcher that was killed have 10 to end
-constexpr double kTick = 0.2;                  // seconds: how long the wish to stop may go unseen
+constexpr std::size_t kHeadsAtOnce = 2000;                   // of files, in one child: some 400 kB of what it says
+constexpr std::size_t kHeads = 0;                            // the child that reads them; cases count from 1
+constexpr ChildLimits kHeadLimits{1000, 600};                // MB and s: heads are read without pixels
+constexpr std::size_t kFeed = static_cast<std::size_t>(-1);  // the child that brings files
+constexpr ChildLimits kFeedLimits{1000, 3600};
+constexpr double kLongestWait = 300;  // seconds, after a feed that failed
+constexpr double kPatience = 12;      // seconds: children of a watcher that was killed have 10 to end
+constexpr double kTick = 0.2;         // seconds: how long the wish to stop may go unseen
 
 // Classes that bone is made from.
 bool is_scan(const std::string& sop_class) {
@@ -191,13 +194,16 @@ class Watcher {
         looked = Clock::now();
         due = true;
       }
+      feed();
       read_new_heads();
       if (due) waiting = begin_ready();
       due = false;
-      if (o_.once && !waiting && !due && children_.running() == 0 && unread_ == 0) break;
+      if (o_.once && !waiting && !due && children_.running() == 0 && unread_ == 0 && looked != Clock::time_point{} && (!o_.feed || fed_))
+        break;
       if (children_.running() == 0) {
         std::this_thread::sleep_for(std::chrono::duration<double>(kTick));
       } else if (const auto end = children_.wait(kTick)) {
+        if (end->id == kFeed && end->exit_code == 0) looked = {};  // what it has brought
         finish(*end);
         due = true;
       }
@@ -206,10 +212,31 @@ class Watcher {
     while (children_.running() > 0) {
       if (const auto end = children_.wait(kTick)) finish(*end);
     }
+    if (o_.once && feed_failed_)
+      throw Error(ExitCode::failed, "not all series could be fetched", "start it again: it goes on where it was");
     return counters_;
   }
 
  private:
+  void feed() {
+    if (!o_.feed || feeding_ || (o_.once && fed_) || Clock::now() < feed_at_) return;
+    feeding_ = true;
+    children_.start(kFeed, o_.feed, kFeedLimits);
+  }
+
+  void take_feed(const ChildEnd& end) {
+    feeding_ = false;
+    fed_ = true;
+    if (context_.cancelled()) return;
+    for (std::size_t at = 0, to = 0; (to = end.err.find('\n', at)) != std::string::npos; at = to + 1)
+      context_.warn(end.err.substr(at, to - at));
+    feed_failed_ = end.exit_code != 0;
+    if (end.exit_code < 0)
+      context_.warn(end.over_time || end.over_memory ? "fetching took more time or memory than it may" : "fetching ended by force");
+    feed_wait_ = feed_failed_ ? std::min(kLongestWait, 2 * feed_wait_) : o_.poll_s;
+    feed_at_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(feed_wait_));
+  }
+
   void tell(const WatchEvent& event) const { tell_to_(event, counters_); }
 
   // What is there now; what is new or has changed is to be read.
@@ -396,6 +423,10 @@ class Watcher {
   }
 
   void finish(const ChildEnd& end) {
+    if (end.id == kFeed) {
+      take_feed(end);
+      return;
+    }
     if (end.id == kHeads) {
       take_heads(end);
       return;
@@ -437,18 +468,24 @@ class Watcher {
   std::map<std::string, std::size_t> settled_;  // without a case: objects when that was decided
   std::map<std::size_t, std::pair<std::string, fs::path>> running_;
   std::size_t unread_ = 0, last_id_ = 0;
-  bool told_full_ = false;
+  bool told_full_ = false, feeding_ = false, fed_ = false, feed_failed_ = false;
+  double feed_wait_ = 1;  // seconds
+  Clock::time_point feed_at_{};
   WatchCounters counters_;
 };
 
 }  // namespace
 
+void check_watch_folders(const fs::path& folder, const fs::path& out) {
+  const std::string a = fs::weakly_canonical(folder).string() + "/", b = fs::weakly_canonical(out).string() + "/";
+  if (b.starts_with(a) || a.starts_with(b))
+    throw Error(ExitCode::usage, "cases may not lie in the folder that is watched, nor it among them", "give --out another folder");
+}
+
 WatchCounters watch_folder(const std::vector<SeriesRule>& rules, const WatchOptions& options, const WatchWork& work,
                            const std::function<void(const WatchEvent&, const WatchCounters&)>& tell, const Context& context) {
   if (!fs::is_directory(options.folder)) throw Error(ExitCode::no_input, "'" + options.folder.string() + "' is no folder to watch");
-  const std::string in = fs::weakly_canonical(options.folder).string() + "/", out = fs::weakly_canonical(options.out).string() + "/";
-  if (out.starts_with(in) || in.starts_with(out))
-    throw Error(ExitCode::usage, "cases may not lie in the folder that is watched, nor it among them", "give --out another folder");
+  check_watch_folders(options.folder, options.out);
   try {
     return Watcher(rules, options, work, tell, context).run();
   } catch (const fs::filesystem_error& e) {
