@@ -7,6 +7,7 @@
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
+#include "osteo/base/parallel.h"
 #include "osteo/bone/burr.h"
 #include "osteo/distance/distance_map.h"
 #include "osteo/grid/brick_linear.h"
@@ -23,57 +24,84 @@ constexpr int kPad = 3;  // voxels beside a structure that its face depends on
 // neighbour on the other side of the face matter: the rest tell the side.
 // What smooths is 2 S - S^2, S being 1 2 1 along each axis: flat faces stay where they are as under S, while curved ones are not drawn
 // inwards (by 0.1 voxel at radii of 2 to 5 under S alone).
-BrickGrid face_field(const Labels& crop) {
+BrickGrid face_field(const Labels& crop, const Context& context) {
   const Frame& f = crop.frame;
-  const double unit = std::min({f.spacing_mm.x, f.spacing_mm.y, f.spacing_mm.z});
-  std::vector<float> phi = squared_distance_mm2(crop.span(), f, 0);
-  {
-    const std::vector<float> outside = squared_distance_mm2(crop.span(), f, 1);
-    for (std::size_t v = 0; v < phi.size(); ++v) {
-      const float inwards = crop.voxels[v] != 0 ? std::sqrt(phi[v]) : -std::sqrt(outside[v]);
-      phi[v] = inwards / static_cast<float>(unit) - std::copysign(0.5F, inwards);
-    }
-  }
-  std::array<float, 5> once{0, 0.25F, 0.5F, 0.25F, 0}, twice{1 / 16.0F, 0.25F, 0.375F, 0.25F, 1 / 16.0F};
-  constexpr float kLeast = 0.2F, kDeep = 4;  // so near a voxel's centre may the face come
+  const Vec3 h = f.spacing_mm;
   const auto [nx, ny, nz] = f.dims;
-  std::vector<Ijk> bricks;
-  std::vector<std::pair<std::size_t, float>> beside;
-  std::vector<std::uint8_t> wanted(static_cast<std::size_t>((nx + 7) / 8) * static_cast<std::size_t>((ny + 7) / 8) *
-                                   static_cast<std::size_t>((nz + 7) / 8));
-  for (int k = 1; k + 1 < nz; ++k) {
-    for (int j = 1; j + 1 < ny; ++j) {
-      for (int i = 1; i + 1 < nx; ++i) {
-        const std::size_t v = crop.offset(i, j, k);
-        const bool inside = crop.voxels[v] != 0;
-        const auto side = [&](int a, int b, int c) { return (crop.voxels[crop.offset(i + a, j + b, k + c)] != 0) == inside; };
-        const bool deep = side(-1, 0, 0) && side(1, 0, 0) && side(0, -1, 0) && side(0, 1, 0) && side(0, 0, -1) && side(0, 0, 1);
-        if (deep && !inside) continue;
-        std::uint8_t& brick =
-            wanted[(static_cast<std::size_t>(k / 8) * static_cast<std::size_t>((ny + 7) / 8) + static_cast<std::size_t>(j / 8)) *
-                       static_cast<std::size_t>((nx + 7) / 8) +
-                   static_cast<std::size_t>(i / 8)];
-        if (brick == 0) bricks.push_back({i / 8, j / 8, k / 8});
-        brick = 1;
-        if (deep) continue;
-        float s1 = 0, s2 = 0;
-        for (int c = -2; c <= 2; ++c) {
-          for (int b = -2; b <= 2; ++b) {
-            float row1 = 0, row2 = 0;
-            for (int a = -2; a <= 2; ++a) {
-              const float p = phi[crop.offset(std::clamp(i + a, 0, nx - 1), std::clamp(j + b, 0, ny - 1), std::clamp(k + c, 0, nz - 1))];
-              row1 += once[static_cast<std::size_t>(a + 2)] * p;
-              row2 += twice[static_cast<std::size_t>(a + 2)] * p;
-            }
-            s1 += once[static_cast<std::size_t>(b + 2)] * once[static_cast<std::size_t>(c + 2)] * row1;
-            s2 += twice[static_cast<std::size_t>(b + 2)] * twice[static_cast<std::size_t>(c + 2)] * row2;
-          }
-        }
-        const float smooth = 2 * s1 - s2;
-        beside.emplace_back(v, inside ? std::max(smooth, kLeast) : std::min(smooth, -kLeast));
+  const float unit = static_cast<float>(std::min({h.x, h.y, h.z}));
+  constexpr float kLeast = 0.2F, kDeep = 4;  // so near a voxel's centre may the face come
+  constexpr int kSmooth = 2;                 // voxels to each side that the smoothing looks at
+  constexpr std::array<float, 5> kOnce{0, 0.25F, 0.5F, 0.25F, 0}, kTwice{1 / 16.0F, 0.25F, 0.375F, 0.25F, 1 / 16.0F};
+  // From a voxel of the smoothing to the one beside the face, and a step on across it.
+  const double within_mm =
+      1.001 * std::max({length({3 * h.x, 2 * h.y, 2 * h.z}), length({2 * h.x, 3 * h.y, 2 * h.z}), length({2 * h.x, 2 * h.y, 3 * h.z})});
+  // Slab by slab: the distances of a whole head are never in memory together.
+  constexpr int kSlab = 48;
+  struct Slab {
+    std::vector<Ijk> bricks;
+    std::vector<std::pair<std::size_t, float>> beside;
+  };
+  std::vector<Slab> slabs(static_cast<std::size_t>((nz + kSlab - 1) / kSlab));
+  const auto bx = static_cast<std::size_t>((nx + 7) / 8), by = static_cast<std::size_t>((ny + 7) / 8);
+  const auto slab_of = [&](std::size_t s) {
+    Slab& out = slabs[s];
+    const int begin = std::max(1, static_cast<int>(s) * kSlab), end = std::min(nz - 1, (static_cast<int>(s) + 1) * kSlab);
+    const int more = kSmooth + static_cast<int>(std::ceil(within_mm / h.z));
+    const int lo = std::max(0, begin - more), hi = std::min(nz, end + more);
+    Frame part = f;
+    part.dims[2] = hi - lo;
+    const std::span<const std::uint8_t> mask = crop.span().subspan(crop.offset(0, 0, lo), part.voxel_count());
+    Context alone;
+    alone.threads = 1;
+    std::vector<float> phi = squared_distance_within_mm2(mask, part, 0, within_mm, alone);
+    {
+      const std::vector<float> outside = squared_distance_within_mm2(mask, part, 1, within_mm, alone);
+      for (std::size_t v = 0; v < phi.size(); ++v) {
+        const float inwards = mask[v] != 0 ? std::sqrt(phi[v]) : -std::sqrt(outside[v]);
+        phi[v] = inwards / unit - std::copysign(0.5F, inwards);
       }
     }
-  }
+    const std::size_t below = crop.offset(0, 0, lo);
+    std::vector<std::uint8_t> wanted(bx * by * static_cast<std::size_t>(kSlab / 8));
+    for (int k = begin; k < end; ++k) {
+      context.check_cancelled();
+      for (int j = 1; j + 1 < ny; ++j) {
+        for (int i = 1; i + 1 < nx; ++i) {
+          const std::size_t v = crop.offset(i, j, k);
+          const bool inside = crop.voxels[v] != 0;
+          const auto side = [&](int a, int b, int c) { return (crop.voxels[crop.offset(i + a, j + b, k + c)] != 0) == inside; };
+          const bool deep = side(-1, 0, 0) && side(1, 0, 0) && side(0, -1, 0) && side(0, 1, 0) && side(0, 0, -1) && side(0, 0, 1);
+          if (deep && !inside) continue;
+          std::uint8_t& brick = wanted[(static_cast<std::size_t>(k % kSlab / 8) * by + static_cast<std::size_t>(j / 8)) * bx +
+                                       static_cast<std::size_t>(i / 8)];
+          if (brick == 0) out.bricks.push_back({i / 8, j / 8, k / 8});
+          brick = 1;
+          if (deep) continue;
+          float s1 = 0, s2 = 0;
+          for (int c = -kSmooth; c <= kSmooth; ++c) {
+            for (int b = -kSmooth; b <= kSmooth; ++b) {
+              float row1 = 0, row2 = 0;
+              for (int a = -kSmooth; a <= kSmooth; ++a) {
+                const float p =
+                    phi[crop.offset(std::clamp(i + a, 0, nx - 1), std::clamp(j + b, 0, ny - 1), std::clamp(k + c, 0, nz - 1)) - below];
+                row1 += kOnce[static_cast<std::size_t>(a + 2)] * p;
+                row2 += kTwice[static_cast<std::size_t>(a + 2)] * p;
+              }
+              s1 += kOnce[static_cast<std::size_t>(b + 2)] * kOnce[static_cast<std::size_t>(c + 2)] * row1;
+              s2 += kTwice[static_cast<std::size_t>(b + 2)] * kTwice[static_cast<std::size_t>(c + 2)] * row2;
+            }
+          }
+          const float smooth = 2 * s1 - s2;
+          out.beside.emplace_back(v, inside ? std::max(smooth, kLeast) : std::min(smooth, -kLeast));
+        }
+      }
+    }
+  };
+  parallel_for(slabs.size(), 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) slab_of(s);
+  });
+  std::vector<Ijk> bricks;
+  for (const Slab& s : slabs) bricks.insert(bricks.end(), s.bricks.begin(), s.bricks.end());
   BrickGrid grid(f, bricks);
   // Zero is far outside, also where no brick is.
   for (std::uint32_t b = 0; b < grid.brick_count(); ++b) {
@@ -82,20 +110,22 @@ BrickGrid face_field(const Labels& crop) {
       if (c.i < nx && c.j < ny && c.k < nz && crop.at(c.i, c.j, c.k) != 0) grid.set(v, 2 * kDeep);
     }
   }
-  for (const auto& [at, value] : beside) {
-    const auto row = static_cast<std::size_t>(nx), slice = row * static_cast<std::size_t>(ny);
-    grid.set(grid.find(static_cast<int>(at % row), static_cast<int>(at % slice / row), static_cast<int>(at / slice)),
-             kDeep + std::clamp(value, -kDeep, kDeep));
+  for (const Slab& s : slabs) {
+    for (const auto& [at, value] : s.beside) {
+      const auto row = static_cast<std::size_t>(nx), slice = row * static_cast<std::size_t>(ny);
+      grid.set(grid.find(static_cast<int>(at % row), static_cast<int>(at % slice / row), static_cast<int>(at / slice)),
+               kDeep + std::clamp(value, -kDeep, kDeep));
+    }
   }
   return grid;
 }
 
 }  // namespace
 
-StructureMap::Field StructureMap::field_of(const TriangleSoup& face, const Frame& frame, double inside_mm, double outside_mm,
-                                           const Context& context) {
+StructureMap::Field StructureMap::field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm,
+                                           double outside_mm, const Context& context) {
   const DistanceMap map =
-      DistanceMapper(face, frame, context.sub(0, 0.3)).map({DistanceRegion::band, inside_mm, outside_mm}, context.sub(0.3, 1));
+      DistanceMapper(face, tree, frame, context.sub(0, 0.2)).map({DistanceRegion::band, inside_mm, outside_mm}, context.sub(0.2, 1));
   Field field{BrickGrid(frame, map.bricks), {}};
   for (std::size_t b = 0; b < map.bricks.size(); ++b) {
     const Ijk o = map.bricks[b];
@@ -129,7 +159,7 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
   }
   crop.voxels = voxels;
   Part part;
-  part.face = surface_nets(face_field(crop), 4, context.sub(0, 0.1)).mesh;
+  part.face = surface_nets(face_field(crop, context), 4, context.sub(0, 0.1)).mesh;
   const TriangleSoup face = soup_of(part.face);
   part.box = bounds_of(face);
   // A lattice in the labels' directions around the structure and `beyond_mm` of what is beside it.
@@ -146,10 +176,12 @@ StructureMap::Part StructureMap::part_of(const Labels& labels, std::uint8_t valu
     return f;
   };
   const double near_mm = 2 * coarsest, wide = std::max(2 * coarsest, 0.3);
-  part.near = field_of(face, around(h, near_mm), near_mm, near_mm, context.sub(0.1, 0.4));
+  const TriangleTree tree(face, crop.frame.direction, context.sub(0.1, 0.2));
+  part.near = field_of(face, tree, around(h, near_mm), near_mm, near_mm, context.sub(0.2, 0.5));
   // A point is between lattice points up to a diagonal away.
   const double kept_mm = far_mm + std::sqrt(3.0) * wide;
-  part.whole = field_of(face, around({wide, wide, wide}, kept_mm), std::numeric_limits<double>::infinity(), kept_mm, context.sub(0.4, 1));
+  part.whole =
+      field_of(face, tree, around({wide, wide, wide}, kept_mm), std::numeric_limits<double>::infinity(), kept_mm, context.sub(0.5, 1));
   return part;
 }
 

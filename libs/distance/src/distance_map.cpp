@@ -23,6 +23,19 @@ struct BlockResult {
   std::vector<std::uint32_t> triangle;
 };
 
+void require_usable(const Frame& frame) {
+  for (std::size_t a = 0; a < 3; ++a) {  // any scale will do here, other than in scans of patients
+    if (frame.dims[a] < 1 || !(frame.spacing_mm[a] > 0) || !std::isfinite(frame.spacing_mm[a])) {
+      throw Error(ExitCode::usage, "the grid needs at least one voxel and a positive spacing along each axis");
+    }
+  }
+}
+
+TriangleTree tree_along(const Frame& frame, const TriangleSoup& soup, const Context& context) {
+  require_usable(frame);
+  return {soup, frame.direction, context};
+}
+
 }  // namespace
 
 std::uint64_t DistanceMap::count() const {
@@ -41,14 +54,14 @@ std::int64_t DistanceMap::find(int i, int j, int k) const {
   return static_cast<std::int64_t>(brick * 512) + (i & 7) + 8 * (j & 7) + 64 * (k & 7);
 }
 
-DistanceMapper::DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context) : frame_(frame) {
-  for (std::size_t a = 0; a < 3; ++a) {  // any scale will do here, other than in scans of patients
-    if (frame.dims[a] < 1 || !(frame.spacing_mm[a] > 0) || !std::isfinite(frame.spacing_mm[a])) {
-      throw Error(ExitCode::usage, "the grid needs at least one voxel and a positive spacing along each axis");
-    }
-  }
-  tree_ = TriangleTree(soup, frame.direction, context.sub(0, 0.5));
-  inside_ = voxels_inside(soup, frame, context.sub(0.5, 1), &report_);
+DistanceMapper::DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context)
+    : DistanceMapper(soup, tree_along(frame, soup, context.sub(0, 0.5)), frame, context.sub(0.5, 1)) {}
+
+DistanceMapper::DistanceMapper(const TriangleSoup& soup, TriangleTree tree, const Frame& frame, const Context& context)
+    : frame_(frame), tree_(std::move(tree)) {
+  require_usable(frame);
+  if (!(tree_.data().axes == frame.direction)) throw Error(ExitCode::usage, "the tree has other axes than the frame");
+  inside_ = voxels_inside(soup, frame, context, &report_);
 }
 
 DistanceMap DistanceMapper::map(const DistanceMapOptions& options, const Context& context) const {

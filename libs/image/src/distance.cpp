@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
 
 namespace osteo {
@@ -116,6 +117,61 @@ std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, cons
       for (std::size_t s = 0; s < strips; ++s) {
         transform_lines(d.data() + j * nx + s * kTogether, nx * ny, frame.dims[2], frame.spacing_mm.z,
                         std::min(kTogether, nx - s * kTogether), turned, lower);
+      }
+    }
+  });
+  return d;
+}
+
+std::vector<float> squared_distance_within_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value, double within_mm,
+                                               const Context& context) {
+  if (!(within_mm > 0) || !std::isfinite(within_mm)) throw Error(ExitCode::usage, "a distance to look within is positive and finite");
+  std::vector<float> d(mask.size());
+  const auto nx = static_cast<std::size_t>(frame.dims[0]);
+  const auto ny = static_cast<std::size_t>(frame.dims[1]);
+  const auto nz = static_cast<std::size_t>(frame.dims[2]);
+  const double most = within_mm * within_mm * (1 + 1e-6);
+  // Rows `stride` apart from f, each `width` wide, become the least of those beside them; in strips that stay in the cache.
+  const auto transform_rows = [&](float* f, std::size_t stride, std::size_t n, std::size_t width, double h, std::vector<float>& before) {
+    const auto window = static_cast<std::size_t>(std::floor(std::sqrt(most) / h));
+    if (window == 0) return;
+    before.resize(n * width);
+    std::vector<std::uint8_t> any(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      std::copy_n(f + i * stride, width, before.data() + i * width);
+      any[i] = std::any_of(f + i * stride, f + i * stride + width, [](float v) { return v != kInfinity; });
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      float* const out = f + i * stride;
+      for (std::size_t from = i - std::min(i, window); from < std::min(n, i + window + 1); ++from) {
+        if (any[from] == 0 || from == i) continue;
+        const double steps = (static_cast<double>(from) - static_cast<double>(i)) * h;
+        const auto more = static_cast<float>(steps * steps);
+        const float* const in = before.data() + from * width;
+        for (std::size_t x = 0; x < width; ++x) out[x] = std::min(out[x], in[x] + more);
+      }
+    }
+  };
+  parallel_for(nz, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> before;
+    for (std::size_t k = begin; k < end; ++k) {
+      context.check_cancelled();
+      float* const slice = d.data() + k * nx * ny;
+      for (std::size_t j = 0; j < ny; ++j)
+        transform_row(mask.data() + k * nx * ny + j * nx, value, slice + j * nx, frame.dims[0], frame.spacing_mm.x);
+      for (std::size_t v = 0; v < nx * ny; ++v) slice[v] = slice[v] <= most ? slice[v] : kInfinity;
+      transform_rows(slice, nx, ny, nx, frame.spacing_mm.y, before);
+    }
+  });
+  parallel_for(ny, 1, context.threads, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> before;
+    for (std::size_t j = begin; j < end; ++j) {
+      context.check_cancelled();
+      float* const rows = d.data() + j * nx;
+      transform_rows(rows, nx * ny, nz, nx, frame.spacing_mm.z, before);
+      for (std::size_t k = 0; k < nz; ++k) {
+        float* const row = rows + k * nx * ny;
+        for (std::size_t x = 0; x < nx; ++x) row[x] = row[x] <= most ? row[x] : kInfinity;
       }
     }
   });

@@ -281,6 +281,22 @@ TEST(DistanceMap, ObliqueAnisotropicAndLeftHandedFrames) {
   }
 }
 
+TEST(DistanceMap, OneTreeServesSeveralFramesOfItsAxes) {
+  const TriangleSoup s = joined(sphere(10, 3), turned(sphere(5, 3, {1, 0, 0})));
+  Frame f = frame_around(s, 30, 3);
+  const Vec3 x = normalized({0.9, 0.3, -0.1}), y = normalized(cross(Vec3{0, 0.2, 1}, x));
+  EXPECT_THROW(DistanceMapper(s, TriangleTree(s, Mat3{{x, y, cross(x, y)}}, {}), f), Error);
+  f.direction = {{x, y, cross(x, y)}};
+  f.origin_mm = f.direction * f.origin_mm;
+  const TriangleTree tree(s, f.direction, {});
+  for (const double scale : {1.0, 2.0}) {
+    f.spacing_mm = f.spacing_mm * scale;
+    const DistanceMap own = DistanceMapper(s, f).map(), shared = DistanceMapper(s, tree, f).map();
+    EXPECT_EQ(own.triangle, shared.triangle);
+    EXPECT_EQ(std::memcmp(own.distance_mm.data(), shared.distance_mm.data(), own.distance_mm.size() * 8), 0);
+  }
+}
+
 TEST(DistanceMap, SameBytesForAnyThreads) {
   const TriangleSoup s = joined(sphere(10, 4), turned(sphere(5, 3, {1, 0, 0})));
   const Frame f = frame_around(s, 70, 3);

@@ -84,6 +84,36 @@ TEST(Distance, EqualsBruteForceWithAnisotropicVoxels) {
   }
 }
 
+TEST(Distance, WithinAWindowItIsTheSame) {
+  for (const Vec3 h : {Vec3{0.7, 1.3, 2.1}, Vec3{2.1, 0.3, 0.7}, Vec3{0.5, 0.5, 0.5}}) {
+    Frame f;
+    f.dims = {31, 27, 19};
+    f.spacing_mm = h;
+    const auto mask = random_mask(f.voxel_count(), 0.004, 5);
+    for (const std::uint8_t value : {0, 1}) {
+      const auto whole = squared_distance_mm2(mask, f, value);
+      for (const double within : {0.2, 0.5, 2.1, 3.9}) {
+        const auto near = squared_distance_within_mm2(mask, f, value, within);
+        std::size_t told = 0;
+        for (std::size_t v = 0; v < mask.size(); ++v) {
+          if (whole[v] <= within * within) {
+            ++told;
+            EXPECT_NEAR(near[v], whole[v], 1e-6 * whole[v]);
+          } else {
+            EXPECT_TRUE(near[v] == std::numeric_limits<float>::infinity() || whole[v] < within * within * (1 + 1e-5)) << near[v];
+          }
+        }
+        EXPECT_GT(told, 0U);
+      }
+    }
+  }
+  Frame f;
+  f.dims = {1, 1, 1};
+  const std::vector<std::uint8_t> one(1, 1);
+  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW((void)squared_distance_within_mm2(one, f, 1, bad), Error);
+}
+
 TEST(Distance, InfiniteWithoutAnySite) {
   Frame f;
   f.dims = {3, 3, 3};

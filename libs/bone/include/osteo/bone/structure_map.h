@@ -16,6 +16,8 @@
 
 namespace osteo {
 
+class TriangleTree;
+
 /// Signed distances to the face of each structure of a label map, structure by structure: at any depth inside, and outside as far as
 /// `reach_mm` beyond the surface of any burr of the library.
 /// The face lies between the voxels of the structure and the others, smoothed so that it does not follow their steps, but never across a
@@ -72,7 +74,8 @@ class StructureMap {
   };
   [[nodiscard]] static Part part_of(const Labels& labels, std::uint8_t value, std::array<std::array<int, 2>, 3> box, double far_mm,
                                     const Context& context);
-  static Field field_of(const TriangleSoup& face, const Frame& frame, double inside_mm, double outside_mm, const Context& context);
+  static Field field_of(const TriangleSoup& face, const TriangleTree& tree, const Frame& frame, double inside_mm, double outside_mm,
+                        const Context& context);
   std::vector<Part> parts_;  // in the order of values_
   std::vector<std::uint8_t> values_;
   double reach_mm_;

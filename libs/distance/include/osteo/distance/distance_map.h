@@ -56,6 +56,9 @@ class DistanceMapper {
  public:
   /// Builds the tree and tells inside from outside. Errors as of TriangleTree.
   DistanceMapper(const TriangleSoup& soup, const Frame& frame, const Context& context = {});
+  /// With a tree of the soup in the axes of the frame (`TriangleTree(soup, frame.direction, ...)`): one serves several frames.
+  /// Error(usage) where its axes are others.
+  DistanceMapper(const TriangleSoup& soup, TriangleTree tree, const Frame& frame, const Context& context = {});
   [[nodiscard]] DistanceMap map(const DistanceMapOptions& options = {}, const Context& context = {}) const;
   /// Of those voxels of a set in the same frame that are within `reach_mm`.
   [[nodiscard]] DistanceMap map_of(const VoxelBits& wanted, double reach_mm = std::numeric_limits<double>::infinity(),

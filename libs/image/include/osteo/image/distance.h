@@ -15,4 +15,10 @@ namespace osteo {
 [[nodiscard]] std::vector<float> squared_distance_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value,
                                                       const Context& context = {});
 
+/// The same where it is at most `within_mm`, infinity elsewhere: a window of so many voxels along each axis in place of whole lines.
+/// O(voxels * within / spacing), without divisions: faster up to about ten voxels. Error(usage) when `within_mm` is not positive and
+/// finite.
+[[nodiscard]] std::vector<float> squared_distance_within_mm2(std::span<const std::uint8_t> mask, const Frame& frame, std::uint8_t value,
+                                                             double within_mm, const Context& context = {});
+
 }  // namespace osteo
