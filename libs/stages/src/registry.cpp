@@ -1,6 +1,7 @@
 #include "osteo/stages/registry.h"
 
 #include "osteo/stages/bone.h"
+#include "osteo/stages/bone_stiffness.h"
 #include "osteo/stages/curve.h"
 #include "osteo/stages/distance.h"
 #include "osteo/stages/edit.h"
@@ -34,6 +35,7 @@ Registry osteo_stages() {
   registry.add<VoxelizeStage>();
   registry.add<TetrahedralizeStage>();
   registry.add<SkinStage>();
+  registry.add<BoneStiffnessStage>();
   registry.add<FemStage>();
   registry.add<CalibrateStage>();
   registry.add<SimulateStage>();
