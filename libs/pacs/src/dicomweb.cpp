@@ -79,11 +79,13 @@ int number_in(const Json& object, const char* attribute, int otherwise) {
   return value;
 }
 
-// Everything but what RFC 3986 calls unreserved.
+// Everything but what RFC 3986 calls unreserved, and slash and colon, which it lets stand in a query: Orthanc's plugin 1.7 takes what is
+// written with % as it is written.
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '.' || c == '_' || c == '~') {
+    if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '.' || c == '_' || c == '~' ||
+        c == '/' || c == ':') {
       out += c;
     } else {
       char hex[4];
