@@ -1,6 +1,8 @@
 // What a web server answers, in pieces; and addresses.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "http.h"
 #include "multipart.h"
 #include "osteo/base/error.h"
@@ -49,6 +51,48 @@ TEST(Multipart, WhatIsNoneIsRefused) {
       EXPECT_THROW(static_cast<void>(parts_of(text, size)), Error) << text.substr(0, 40) << " in pieces of " << size;
   for (const std::string& boundary : {std::string(), std::string(71, 'a'), std::string("a\r\nb"), std::string("a "), std::string("a\"b")})
     EXPECT_THROW(MultipartReader(boundary, {}), Error) << boundary;
+}
+
+// Whatever comes: the same parts, or the same refusal, in pieces of any size, and nothing is read that is not there (sanitizers).
+TEST(Multipart, MutationsAreTakenTheSameWayInPieces) {
+  const std::string begin = "\r\n--b0\r\nA: 1\r\n\r\nfirst\r\n--b0\r\n\r\n--b\r\n--b0--", bits = "\r\n-b0 :;=\"\\A";
+  std::mt19937 random(7);
+  const auto below = [&](std::size_t n) { return random() % n; };
+  const auto outcome = [](const std::string& text, std::size_t size) {
+    try {
+      return parts_of(text, size);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+  };
+  std::size_t refused = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    std::string text = begin;
+    for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
+      const std::size_t at = below(text.size());
+      const char c = bits[below(bits.size())];
+      switch (below(3)) {
+        case 0:
+          text[at] = c;
+          break;
+        case 1:
+          text.insert(text.begin() + static_cast<std::ptrdiff_t>(at), c);
+          break;
+        default:
+          text.erase(at, 1 + below(3));
+          break;
+      }
+    }
+    const std::string whole = outcome(text, text.size());
+    refused += whole.starts_with("an answer") ? 1 : 0;
+    ASSERT_EQ(outcome(text, 1), whole) << text;
+    ASSERT_EQ(outcome(text, 1 + below(9)), whole) << text;
+    try {
+      static_cast<void>(parse_media_type(text));
+    } catch (const Error&) {
+    }
+  }
+  EXPECT_GT(refused, 1'000U);
 }
 
 TEST(MediaType, IsReadWithItsParameters) {
