@@ -93,7 +93,7 @@ _osteo() {
     run) flags="$flags --validate --dry-run --reuse --engine" ;;
     prepare) flags="$flags --out --preset --lower --spacing-mm --region --remove-table --keep-table --structures --names --series --axes --hu-offset --pipeline --edits --fresh --no-report" ;;
     batch) flags="$flags --out --pipeline --jobs --memory-mb --minutes --retries --retry-failed --keep-free-mb --only --report-only --no-report" ;;
-    report) flags="$flags --scan" ;;
+    report) flags="$flags --scan --dicom" ;;
     approve) flags="$flags --by --note --withdraw" ;;
     edit) flags="$flags --apply --scan --width --height --state-file" ;;
     hand-over) flags="$flags --source" ;;
@@ -124,8 +124,8 @@ _osteo() {
     calibrate-pen) flags="$flags --camera --out --pen --ruler-mm --seconds" ;;
     track-pen) flags="$flags --camera --pen --seconds" ;;
     deidentify) flags="$flags --out --key --map" ;;
-    send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dry-run --check --deidentify --key" ;;
-    fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --out --study --series --accession --patient-id --date --modality --series-gb" ;;
+    send) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dicomweb --dicomweb-login --dicomweb-ca --dry-run --check --deidentify --key" ;;
+    fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dicomweb --dicomweb-login --dicomweb-ca --out --study --series --accession --patient-id --date --modality --series-gb" ;;
     receive) flags="$flags --ae --bind --port --allow --anybody --associations --object-gb --folder-gb --keep-free-gb --memory-mb --timeout-s --association-s --quiet-s --metrics --tls-ca --tls-certificate --tls-key" ;;
     watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --orthanc --orthanc-login --orthanc-ca --timeout-s --object-gb --once --no-report --metrics" ;;
     doctor) flags="$flags --seconds --rate-hz" ;;

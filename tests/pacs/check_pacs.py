@@ -1,6 +1,6 @@
 """send, fetch and receive against programs nobody here wrote: Orthanc, DCMTK's storescu and echoscu; then against peers that lie.
-usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, doors, tls or units"""
-import base64, contextlib, http.server, json, os, pathlib, shutil, signal, socket, struct, subprocess, sys, threading, time, urllib.request, warnings
+usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, doors, dicomweb, dicomweb_lies, tls or units"""
+import base64, contextlib, http.server, io, json, os, pathlib, shutil, signal, socket, ssl, struct, subprocess, sys, threading, time, urllib.parse, urllib.request, warnings
 
 if missing := [p for p in ("Orthanc", "storescu", "echoscu", "openssl") if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin")]:
     print(f"skipped: {', '.join(missing)} not installed (Debian: orthanc, dcmtk, openssl)")
@@ -80,11 +80,11 @@ def ct_series(ask):
 
 
 @contextlib.contextmanager
-def orthanc(dicom, http, receiver_port, login=None):
+def orthanc(dicom, http, receiver_port, login=None, plugins=()):
     folder = work / "orthanc"
     config = {"StorageDirectory": str(folder), "IndexDirectory": str(folder), "HttpPort": http, "DicomPort": dicom, "DicomAet": "ORTHANC",
               "RemoteAccessAllowed": False, "AuthenticationEnabled": False, "DicomCheckCalledAet": True, "DicomAlwaysAllowStore": False,
-              "DicomAlwaysAllowEcho": False, "DicomAlwaysAllowFind": False, "DicomAlwaysAllowGet": False, "Plugins": [],
+              "DicomAlwaysAllowEcho": False, "DicomAlwaysAllowFind": False, "DicomAlwaysAllowGet": False, "Plugins": [str(p) for p in plugins],
               "DicomModalities": {"osteotome": {"AET": "OSTEOTOME", "Host": "127.0.0.1", "Port": receiver_port, "AllowEcho": True, "AllowFind": True,
                                                 "AllowGet": True, "AllowMove": True, "AllowStore": True}}}
     if login:
@@ -570,6 +570,385 @@ def doors():
     assert not any(word in text for text in said for word in ("tell-nobody", "WATCHED", "1.2.3.", "Petrous")), "told"
 
 
+SECRET = "doctor:tell-nobody"
+
+
+def web_door(said, root=None):
+    for name, text, mode in (("login", SECRET, 0o600), ("open", SECRET, 0o644), ("bad", "doctor:wrong", 0o600)):
+        (work / name).write_text(text + "\n")
+        (work / name).chmod(mode)
+
+    def web(command, *args, rc=0, at=None, login="login", timeout="60"):
+        r = run(osteo, command, *args, "--dicomweb", at or root, "--timeout-s", timeout, *(["--dicomweb-login", login] if login else []), rc=rc)
+        said.append(r.stdout + r.stderr)
+        return json.loads(r.stdout) if "--json" in args and rc in (0, 8) else r.stdout + r.stderr
+    return web
+
+
+def make_many(path):
+    """130 objects of one slice, which is more than goes into one request."""
+    (work / "many").mkdir()
+    d = pydicom.dcmread(path)
+    d.compress(pydicom.uid.RLELossless, generate_instance_uid=False)
+    d.SeriesInstanceUID = "1.2.3.50"
+    for i in range(130):
+        d.SOPInstanceUID = d.file_meta.MediaStorageSOPInstanceUID = f"1.2.3.50.{i}"
+        d.save_as(work / "many" / f"{i:03d}.dcm", enforce_file_format=True)
+
+
+def dicomweb():
+    """The report of a case as a DICOM object; send and fetch by STOW-RS, QIDO-RS and WADO-RS: against Orthanc with its plugin and a password."""
+    plugin = pathlib.Path("/usr/share/orthanc/plugins/libOrthancDicomWeb.so")
+    if not plugin.exists():
+        print("skipped: Orthanc's DICOMweb plugin not installed (Debian: orthanc-dicomweb)")
+        sys.exit(77)
+    warnings.simplefilter("ignore")
+    os.environ["XDG_STATE_HOME"] = str(work / "state")
+    files = make_scan()
+    said = []
+    # A patient with a name, in a case with a report.
+    for path in files:
+        d = pydicom.dcmread(path)
+        d.PatientName, d.PatientID, d.AccessionNumber, d.StudyDate = "WEB^PERSON", "P-47/11", "A4711", "20240131"
+        d.save_as(path, enforce_file_format=True)
+    head = pydicom.dcmread(files[0], stop_before_pixels=True)
+    run(osteo, "prepare", "ct", "-o", "case", "--lower", "500", "--spacing-mm", "2", "--no-report", "--quiet")
+    assert "names the patient" in run(osteo, "report", "case", "--dicom", "case.report.dcm").stderr
+    report = pydicom.dcmread("case.report.dcm")
+    assert (report.SOPClassUID, report.Modality, report.MIMETypeOfEncapsulatedDocument) == ("1.2.840.10008.5.1.4.1.1.104.1", "DOC", "application/pdf")
+    for key in ("PatientName", "PatientID", "AccessionNumber", "StudyDate", "StudyInstanceUID"):
+        assert report[key].value == head[key].value, key
+    assert report.SeriesInstanceUID != head.SeriesInstanceUID and report.SOPInstanceUID != head.SOPInstanceUID
+    uid = lambda p: pydicom.dcmread(p, stop_before_pixels=True).SOPInstanceUID
+    assert {i.ReferencedSOPInstanceUID for i in report.SourceInstanceSequence} == {uid(p) for p in files}
+    assert report.EncapsulatedDocument[:report.EncapsulatedDocumentLength] == (work / "case.report.pdf").read_bytes()
+    if shutil.which("dciodvfy"):
+        checked = subprocess.run(["dciodvfy", "case.report.dcm"], capture_output=True, text=True)
+        assert "EncapsulatedPDF" in checked.stdout + checked.stderr and "Error" not in checked.stdout + checked.stderr, checked
+    again = pydicom.dcmread("case.report.dcm").SOPInstanceUID
+    run(osteo, "report", "case", "--dicom", "case.report.dcm", "--quiet", rc=6)
+    run(osteo, "report", "case", "--dicom", "case.report.dcm", "--quiet", "--force")
+    assert uid("case.report.dcm") == again, "same pages, same object"
+    run(osteo, "report", "case", "--dicom", "case.report.pdf", rc=2)
+    # Never another patient's: the scan must be the one the case was made from.
+    run(osteo, "phantom", "other", "--region", "temporal", "--spacing-mm", "3", "--quiet")
+    assert "is not the scan" in run(osteo, "report", "case", "--scan", "other", "--dicom", "x.dcm", rc=4).stderr
+    os.environ["XDG_STATE_HOME"] = str(work / "forgotten")
+    assert "not at hand" in run(osteo, "report", "case", "--dicom", "x.dcm", rc=3).stderr
+    run(osteo, "report", "case", "--scan", "ct", "--dicom", "y.dcm", "--quiet")
+    assert uid("y.dcm") == again
+    # Of several series, the one that was asked for.
+    shutil.copytree("ct", "two")
+    for path in files:
+        d = pydicom.dcmread(path)
+        d.SeriesInstanceUID, d.SeriesNumber = "1.2.3.60", 9
+        d.SOPInstanceUID = d.file_meta.MediaStorageSOPInstanceUID = f"1.2.3.60.{d.InstanceNumber}"
+        d.save_as(work / "two" / f"second-{d.InstanceNumber}.dcm", enforce_file_format=True)
+    run(osteo, "prepare", "two", "-o", "second", "--series", "9", "--lower", "500", "--spacing-mm", "2", "--no-report", "--quiet")
+    run(osteo, "report", "second", "--scan", "two", "--dicom", "second.dcm", "--quiet")
+    assert {i.ReferencedSOPInstanceUID for i in pydicom.dcmread("second.dcm").SourceInstanceSequence} == {f"1.2.3.60.{i + 1}" for i in range(len(files))}
+    run(osteo, "import", "ct", "ct.nrrd", "--quiet")
+    run(osteo, "prepare", "ct.nrrd", "-o", "plain", "--lower", "500", "--spacing-mm", "2", "--no-report", "--quiet")
+    run(osteo, "report", "plain", "--dicom", "x.dcm", rc=3)
+    assert not (work / "x.dcm").exists()
+
+    dicom, http_port = free_port(), free_port()
+    root = f"http://127.0.0.1:{http_port}/dicom-web/"
+    web = web_door(said, root)
+    study = ("--study", head.StudyInstanceUID)
+    # What is wrong is told before anybody is spoken to.
+    for address, login, word in (("ftp://x", "login", "http"), ("http://a:b@127.0.0.1:1", "login", "user"), ("http://example.org", None, "in the clear"),
+                                 ("http://example.org", "login", "password"), (root, "open", "others can read"), ("https://", "login", "no address"),
+                                 ("https://x?y", "login", "no address")):
+        for command in (("send", "ct"), ("fetch", *study)):
+            err = web(*command, at=address, login=login, rc=2)
+            assert word in err and "a:b" not in err, err
+    for flags in (("--dicomweb-login", "login"), ("--dicomweb", root, "--peer", "A@127.0.0.1:104"), ("--dicomweb", root, "--ae", "X"), ("--dicomweb", root, "--tls-ca", "ca.pem"), ()):
+        run(osteo, "send", "ct", *flags, rc=2)
+        run(osteo, "fetch", *study, *flags, rc=2)
+    web("fetch", rc=2)
+    web("fetch", "--study", "1.2*", rc=2)
+    assert "would send to " + root[:-1] in web("send", "ct", "--dry-run"), "nobody is there, and nobody is asked"
+    assert "onnect" in web("send", "ct", rc=7) and "onnect" in web("fetch", *study, rc=7)
+    with orthanc(dicom, http_port, free_port(), SECRET, [plugin]) as ask:
+        assert "refuses the login" in web("send", "ct", login="bad", rc=7) and "asks for a login" in web("fetch", *study, login=None, rc=7)
+        assert "root of a DICOMweb" in web("fetch", *study, at=root.replace("dicom-web/", ""), rc=7)
+        assert "no STOW-RS" in json.dumps(web("send", "ct", "--json", "--quiet", at=root.replace("dicom-web/", "nothing"), rc=8))
+        web("send", "ct", "--dry-run")
+        assert ask("/instances") == [], "dry means dry"
+        n = len(files)
+        begin = time.monotonic()
+        sent = web("send", "ct", "--json", "--quiet")
+        print(f"STOW-RS: {n} slices in {time.monotonic() - begin:.2f} s")
+        assert (sent["objects"], sent["accepted"], sent["safe"], sent["checked"], sent["peer"]) == (n, n, n, True, root[:-1]), sent
+        assert len(ask("/instances")) == n
+        # The report, by both doors; then back, and read by others.
+        assert web("send", "case.report.dcm", "--json", "--quiet")["safe"] == 1
+        node = ("--peer", f"ORTHANC@127.0.0.1:{dicom}")
+        assert json.loads(run(osteo, "send", "case.report.dcm", *node, "--json", "--quiet").stdout)["safe"] == 1
+        assert len(ask("/studies")) == 1 and len(ask("/series")) == 2
+        listed = web("fetch", *study, "--json")
+        assert [(s["modality"], s["images"], s["number"]) for s in listed] == [("CT", n, 1), ("DOC", 1, 9003)], listed
+        assert listed == json.loads(run(osteo, "fetch", *study, *node, "--json").stdout), "as C-FIND has it"
+        for keys in (("--patient-id", "P-47/11"), ("--accession", "A4711"), ("--date", "20240101-20241231"), ("--series", listed[0]["series"]), (*study, "--series", "1"), (*study, "--modality", "CT")):
+            assert web("fetch", *keys, "--json", "--modality", "CT") == listed[:1], keys
+        for keys in (("--patient-id", "P-47"), ("--accession", "A"), ("--date", "20250101-"), ("--series", "1.2.3"), (*study, "--series", "7")):
+            assert "nothing matches" in web("fetch", *keys, rc=3), keys
+        begin = time.monotonic()
+        assert web("fetch", *study, "--modality", "CT", "-o", "back", "--json", "--quiet")["images"] == n
+        print(f"WADO-RS: {n} slices in {time.monotonic() - begin:.2f} s")
+        assert {uid(p): data_set(p) for p in (work / "back").iterdir()} == {uid(p): data_set(p) for p in files}, "bit for bit"
+        run(osteo, "import", "back", "back.nrrd", "--quiet")
+        web("fetch", *study, "--modality", "DOC", "-o", "document", "--quiet")
+        (document,) = (work / "document").iterdir()
+        back = pydicom.dcmread(document)
+        (work / "back.pdf").write_bytes(back.EncapsulatedDocument[:back.EncapsulatedDocumentLength])
+        assert back == pydicom.dcmread("case.report.dcm") and (work / "back.pdf").read_bytes() == (work / "case.report.pdf").read_bytes()
+        if shutil.which("pdftotext"):
+            assert "Not a medical device" in " ".join(run("pdftotext", "back.pdf", "-").stdout.split())
+        run(osteo, "fetch", *study, *node, "--modality", "DOC", "-o", "by-node", "--quiet")
+        assert pydicom.dcmread(work / "by-node" / "000001.dcm") == back, "by both doors the same"
+        # What was fetched stays, what is too large does not come.
+        web("fetch", *study, "--modality", "CT", "-o", "back", rc=6)
+        assert "larger than allowed" in web("fetch", *study, "--modality", "CT", "-o", "small", "--series-gb", "0.0001", rc=9) and not (work / "small").exists()
+        assert "2 series match" in web("fetch", *study, "-o", "all", rc=2) and not (work / "all").exists()
+        # Copies that identify nobody, through the same door.
+        assert web("send", "ct", "--deidentify", "--json", "--quiet")["safe"] == n and len(ask("/studies")) == 2
+        assert "each object is left out" in web("send", "case.report.dcm", "--deidentify", rc=7), "documents stay"
+        # Compressed, and in more than one request.
+        make_many(files[len(files) // 2])
+        assert web("send", "many", "--json", "--quiet")["safe"] == 130
+        web("fetch", *study, "--series", "1.2.3.50", "-o", "rle", "--quiet")
+        assert {uid(p): data_set(p) for p in (work / "rle").iterdir()} == {uid(p): data_set(p) for p in (work / "many").iterdir()}, "in the form in which they are"
+        # Some that are good, one that is cut, one without a head: the good ones arrive or it says that they did not.
+        (work / "mixed").mkdir()
+        shutil.copy(files[0], work / "mixed" / "a.dcm")
+        (work / "mixed" / "b.dcm").write_bytes(data_set(files[1]))
+        sent = web("send", "mixed", "--json", "--quiet", rc=8)
+        assert (sent["objects"], sent["accepted"], sent["safe"]) == (2, 1, 1) and "file meta information" in sent["problems"][0]["problem"], sent
+    assert not any(word in text for text in said for word in ("tell-nobody", "WEB^PERSON")), "told"
+
+
+def dicomweb_lies():
+    """A server that lies, by STOW-RS, QIDO-RS and WADO-RS. What it answers, by the end of the path."""
+    warnings.simplefilter("ignore")
+    files = make_scan()
+    make_many(files[0])
+    said = []
+    web = web_door(said)
+    study, series = "1.2.840.1", "1.2.840.1.5"
+
+    def instance(n, of=series, cut=None):
+        d = pydicom.dcmread(files[0])
+        d.StudyInstanceUID, d.SeriesInstanceUID, d.PatientID, d.AccessionNumber = study, of, "LIED", "7"
+        d.SOPInstanceUID = d.file_meta.MediaStorageSOPInstanceUID = f"{series}.{n}"
+        to = io.BytesIO()
+        d.save_as(to, enforce_file_format=True)
+        return to.getvalue()[:cut]
+    good = [instance(n) for n in range(3)]
+    text = lambda value, vr="UI": {"vr": vr, "Value": [value]}
+    as_json = lambda x: json.dumps(x).encode()
+    of_study = {"0020000D": text(study), "00100020": text("LIED", "LO"), "00080050": text("7", "SH")}
+    of_series = {"0020000D": text(study), "0020000E": text(series), "00080060": text("CT", "CS"), "00200011": text(4, "IS"), "00201209": text("3", "IS"), "0008103E": text("Red \x1b[31m", "LO")}
+    of_instances = [{"00080018": text(f"{series}.{n}")} for n in range(3)]
+    MULTI = 'multipart/related; type="application/dicom"; boundary="b 0"'
+    PART = b"Content-Type: application/dicom\r\n\r\n"
+    multi = lambda parts, head=PART, end=b"--": b"".join(b"\r\n--b 0\r\n" + head + p for p in parts) + b"\r\n--b 0" + end
+    truth = {"studies": (200, as_json([of_study]), {}), "series": (200, as_json([of_series]), {}), "instances": (200, as_json(of_instances), {}),
+             series: (200, multi(good), {"Content-Type": MULTI})}
+    answers, posts = {}, []
+
+    class Liar(http.server.BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def answer(self, answer):
+            if answer == "stall":
+                time.sleep(8)
+                self.close_connection = True
+                return
+            if answer == "hang up":
+                self.close_connection = True
+                self.connection.shutdown(socket.SHUT_RDWR)
+                return
+            status, body, headers = answer
+            with contextlib.suppress(OSError):
+                if headers == "endless":
+                    self.wfile.write(b"HTTP/1.1 200 OK\r\n")
+                    while True:
+                        self.wfile.write(b"X-More: " + b"x" * 1000 + b"\r\n")
+                self.send_response(status)
+                pieces = [body] if isinstance(body, bytes) else body
+                self.send_header("Connection", "close")
+                if isinstance(body, bytes) and "Content-Length" not in headers:
+                    self.send_header("Content-Length", str(len(body)))
+                for name, value in headers.items():
+                    if value is not None:
+                        self.send_header(name, value)
+                self.end_headers()
+                for piece in pieces:
+                    self.wfile.write(piece)
+            self.close_connection = True
+
+        def do_GET(self):
+            path, _, query = self.path.partition("?")
+            assert path.startswith("/web/"), path
+            name = path.rsplit("/", 1)[1]
+            answer = answers.get(name, truth.get(name, (404, b"", {})))
+            if name in ("studies", "series", "instances") and answer is truth.get(name) and "offset=0" not in query:
+                answer = (204, b"", {})
+            self.answer(answer(query) if callable(answer) else answer)
+
+        def do_POST(self):
+            assert self.path == "/web/studies" and self.headers["Content-Type"].startswith('multipart/related; type="application/dicom"; boundary=')
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            posts.append(body)
+            answer = answers["POST"]
+            self.answer(answer(len(posts)) if callable(answer) else answer)
+
+        def log_message(self, *a):
+            pass
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Liar)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    there = f"http://127.0.0.1:{server.server_address[1]}/web"
+    keys = ("--study", study, "--accession", "7", "--patient-id", "lied", "--modality", "CT")
+
+    # The truth first; a terminal is not told what to do.
+    assert "Red ?[31m" in web("fetch", *keys, at=there)
+    assert web("fetch", *keys, "-o", "true", "--json", "--quiet", at=there.replace("127.0.0.1", "localhost"))["images"] == 3
+    assert [p.read_bytes() for p in sorted((work / "true").iterdir())] == good
+    # What is asked for comes as it was meant, whatever is in it.
+    answers["studies"] = lambda query: (200, as_json([of_study | {"00100020": text(urllib.parse.parse_qs(query)["PatientID"][0], "LO"), "00080050": text("a b&c=%41+/#", "SH")}]), {})
+    assert "Red" in web("fetch", "--patient-id", "&Łódź;+ 1", "--accession", "A b&c=%41+/#", at=there)
+    del answers["studies"]
+    # Servers that give fewer than they are asked for, and one that knows no offset.
+    answers["instances"] = lambda query: (200, as_json(of_instances[int(dict(p.split("=") for p in query.split("&"))["offset"]):][:1]), {})
+    assert web("fetch", *keys, "-o", "paged", "--json", "--quiet", at=there)["images"] == 3
+    answers["instances"] = lambda query: truth["instances"]
+    assert web("fetch", *keys, "-o", "unpaged", "--json", "--quiet", at=there)["images"] == 3
+    answers.clear()
+
+    def endless(piece):
+        while True:
+            yield piece
+    counter = iter(range(1, 10**9))
+    new_ones = lambda attribute, others, page=500: lambda query: (200, as_json([others | {attribute: text(f"1.9.{next(counter)}")} for _ in range(page)]), {})
+    type_of = lambda value: {"Content-Type": value}
+    M = type_of(MULTI)
+    whole = multi(good)
+    # Sequences within sequences: who reads them as a tree climbs until the stack ends.
+    nested = instance(0)
+    at = nested.index(b"\xe0\x7f\x10\x00")
+    deep = nested[:at] + (b"\x40\x00\x30\xa7SQ\x00\x00\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff") * 1_000_000
+    lies = [  # name, answer, exit codes, a word of what is said
+        ("studies", (200, b"<html>", {}), 7, "no list"), ("studies", (200, b"{}", {}), 7, "no list"), ("studies", (200, b"", {}), 7, "no list"), ("studies", (200, b"[" * 100_000, {}), 7, "no list"),
+        ("studies", (200, b" " * 20_000_000, {}), 7, "more than 8 MB"), ("studies", (200, endless(b"[" + b"{}," * 10_000), {}), 7, "more than 8 MB"),
+        ("studies", (200, b"[" + b"{}," * 2_600_000 + b"{}]", {}), 7, "without a UID"), ("studies", (200, as_json([{}]), {}), 7, "without a UID"), ("studies", (200, as_json([1, "x", None]), {}), 7, "without a UID"),
+        ("studies", (200, as_json([of_study | {"0020000D": text("../../../system")}]), {}), 7, "without a UID"),
+        ("studies", (200, as_json([of_study | {"0020000D": text("1.2.840.2")}]), {}), 7, "not asked for"), ("studies", (200, as_json([of_study | {"00100020": text("ANOTHER", "LO")}]), {}), 7, "not asked for"),
+        ("studies", (302, b"", {"Location": "/web/elsewhere"}), 7, "points elsewhere"), ("studies", (500, b"no", {}), 7, "status 500"), ("studies", (401, b"", {"WWW-Authenticate": "Basic"}), 7, "refuses the login"),
+        ("studies", "stall", 7, "imeout"), ("studies", "hang up", 7, ""), ("studies", (200, b"", "endless"), 7, ""), ("studies", (200, b"[]", {"Content-Length": "100"}), 7, ""),
+        ("studies", new_ones("0020000D", {}), 7, "not asked for"), ("series", new_ones("0020000E", of_series), 2, "more than 10000"),
+        ("series", (200, as_json([of_series | {"00080060": text("MR", "CS")}]), {}), 7, "not asked for"), ("series", (200, as_json([of_series | {"0020000D": text("1.2.840.2")}]), {}), 7, "not asked for"),
+        ("series", (200, as_json([of_series | {"0020000E": text("1.2/../..")}]), {}), 7, "without a UID"), ("series", (200, as_json([of_series | {"00201209": text(4, "IS")}]), {}), 7, "4 objects"),
+        ("instances", (404, b"", {}), 7, "status 404"), ("instances", (200, as_json([{"00080018": text("x")}]), {}), 7, "without a UID"), ("instances", (204, b"", {}), 3, "nothing of this series"),
+        ("instances", (200, as_json(of_instances[:2]), {}), 7, "2 are listed"),
+        (series, (200, whole[:-40], M), 7, "broke off"), (series, (200, whole[:-2], M), 7, "broke off"), (series, (200, b"", M), 7, "broke off"), (series, (200, whole[:-100], M | {"Content-Length": str(len(whole))}), 7, ""),
+        (series, (200, multi(good[:2]), M), 7, "2 came"), (series, (200, multi([*good, good[0]]), M), 7, "more objects"), (series, (200, multi([good[0], good[1], good[1]]), M), 7, "twice"),
+        (series, (200, multi([]), M), 7, ""), (series, (200, whole, type_of(MULTI.replace("b 0", "b 1"))), 7, ""), (series, (200, whole, type_of(MULTI.split("; b")[0])), 7, "boundary"),
+        (series, (200, whole, type_of(MULTI.replace("b 0", "b" * 71))), 7, "boundary"), (series, (200, whole, type_of("application/json")), 7, "no DICOM objects"), (series, (200, whole, {}), 7, "no DICOM objects"),
+        (series, (200, whole, type_of(MULTI.replace("application/dicom", "image/jpeg"))), 7, "no DICOM objects"), (series, (200, whole, type_of(MULTI + "; boundary=x")), 7, ""),
+        (series, (200, multi(good, b"Content-Type: text/html\r\n\r\n"), M), 7, "no DICOM object"), (series, (200, multi(good, b"X: " + b"x" * 100_000), M), 7, "head of a part"),
+        (series, (200, multi([good[0], good[1], instance(2, cut=-9)]), M), 7, "no whole DICOM"), (series, (200, multi([good[0], good[1], b""]), M), 7, "no whole DICOM"),
+        (series, (200, multi([good[0], good[1], b"x" * 5000]), M), 7, "no whole DICOM"), (series, (200, multi([good[0], good[1], instance(2, of="1.2.840.9")]), M), 7, "not asked for"),
+        (series, (200, multi([good[0], good[1], instance(7)]), M), 7, "not asked for"), (series, (200, multi([deep, good[1], good[2]]), M), 7, ""),
+        (series, (200, endless(b"x" * 65_536), M), 7, "boundary"), (series, (200, (p for head in [b"--b 0\r\n" + PART] for p in [head, *([b"x" * 65_536] * 100_000)]), M), 9, "larger than allowed"),
+        (series, (302, b"", {"Location": f"/web/{series}"}), 7, "points elsewhere"), (series, (307, b"", {"Location": "http://127.0.0.1:1/"}), 7, "points elsewhere"),
+        (series, (206, whole, M), 7, "status 206"), (series, (404, b"", {}), 7, "status 404"), (series, (406, b" " * 20_000_000, {}), 7, "status 406"), (series, (500, b"no", {}), 7, "status 500"), (series, (403, b"", {}), 7, "refuses the login"),
+        (series, "stall", 7, "imeout"), (series, "hang up", 7, ""), (series, (200, iter([whole[:2000]]), M), 7, "broke off")]
+    before = set(work.iterdir())
+    peak = 0
+    for n, (name, lie, rc, word) in enumerate(lies):
+        answers.clear()
+        answers[name] = lie
+        line = [osteo, "fetch", *keys, "-o", work / f"lied-{n}", "--series-gb", "0.05", "--dicomweb", there, "--dicomweb-login", "login", "--timeout-s", "2" if lie == "stall" else "60"]
+        with open(work / "lied.txt", "w+") as log:
+            process = subprocess.Popen([str(a) for a in line], stdout=log, stderr=log)
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            log.seek(0)
+            err = log.read()
+        said.append(err)
+        peak = max(peak, used.ru_maxrss)
+        assert process.returncode == rc and word in err and "core" not in err, (n, name, str(lie)[:200], process.returncode, rc, err)
+        assert set(work.iterdir()) - {work / "lied.txt"} == before, (n, name, set(work.iterdir()) - before)
+    print(f"{len(lies)} lies to fetch: at most {peak / 1000:.0f} MB")
+    assert peak < 900_000, peak  # an answer of 8 MB in JSON becomes 450 MB
+    # Stopped in the middle: nothing is left.
+    answers.clear()
+    asked = threading.Event()
+    answers[series] = lambda query: asked.set() or "stall"
+    with open(work / "lied.txt", "w") as log, subprocess.Popen([str(a) for a in [osteo, "fetch", *keys, "-o", work / "stopped", "--dicomweb", there]], stdout=log, stderr=log) as process:
+        assert asked.wait(120)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(120) == 130
+    assert set(work.iterdir()) - {work / "lied.txt"} == before
+    # STOW-RS: what it says of each object is believed in nothing but refusals, until the query finds it.
+    (work / "out").mkdir()
+    for n, data in enumerate(good):
+        (work / "out" / f"{n}.dcm").write_bytes(data)
+    stored = lambda *which, **more: [{"00081150": text("1.2"), "00081155": text(f"{series}.{n}"), **more} for n in which]
+    reason = lambda code: {"00081197": {"vr": "US", "Value": [code]}}
+    response = lambda ok=(), bad=(): as_json({k: {"vr": "SQ", "Value": list(v)} for k, v in (("00081199", ok), ("00081198", bad)) if v} | {"00081190": text("http://elsewhere", "UR")})
+    warned = {"00081196": {"vr": "US", "Value": [0xB000]}}
+    for n, (answer, accepted, safe, word) in enumerate([
+            ((200, response(stored(0, 1, 2)), {}), 3, 3, ""), ((200, b"[" + response(stored(0, 1, 2)) + b"]", {}), 3, 3, ""), ((202, response(stored(0, 1, 2, **warned)), {}), 3, 3, "changed values"),
+            ((202, response(stored(0, 2), stored(1, **reason(0xA700))), {}), 2, 2, "out of resources"), ((202, response(stored(0, 2), stored(1, **reason(0xC122))), {}), 2, 2, "transfer syntax"),
+            ((200, response(stored(0, 1, 2), stored(1, **reason(0x0124))), {}), 2, 2, "may not send"), ((200, response(stored(0, 1, 7)), {}), 2, 2, "does not say"),
+            ((409, response((), stored(0, 1, 2, **reason(0x0111))), {}), 0, 0, "another object"), ((409, response(stored(0, 1, 2)), {}), 0, 0, "does not say"), ((202, response((), stored(0, 1, 2)), {}), 0, 0, "does not say why"),
+            ((200, b"", {}), 0, 0, "no JSON"), ((200, b"<NativeDicomModel/>", {}), 0, 0, "no JSON"), ((200, b"[" * 100_000, {}), 0, 0, "no JSON"), ((200, b"[1]", {}), 0, 0, "no JSON"), ((204, b"", {}), 0, 0, "status 204"),
+            ((400, b"no", {}), 0, 0, "status 400"), ((413, b"no", {}), 0, 0, "too long"), ((415, b"no", {}), 0, 0, "status 415"), ((500, b"no" * 10_000_000, {}), 0, 0, "status 500"), ((503, b"no", {}), 0, 0, "out of resources")]):
+        answers.clear()
+        answers["POST"] = answer
+        posts.clear()
+        result = web("send", "out", "--json", "--quiet", at=there, rc=0 if safe == 3 else 8)
+        assert (result["objects"], result["accepted"], result["safe"]) == (3, accepted, safe), (n, answer, result)
+        assert word in json.dumps(result["problems"]) and len(result["problems"]) >= 3 - safe, (n, result)
+        assert len(posts) == 1 and all(posts[0].count(data) == 1 for data in good), "each as it is, once"
+    # Accepted, and not there; a query that fails.
+    answers |= {"POST": (200, response(stored(0, 1, 2)), {}), "instances": lambda query: (200, as_json(of_instances[:1]), {})}
+    result = web("send", "out", "--json", "--quiet", at=there, rc=8)
+    assert (result["accepted"], result["safe"]) == (3, 1) and "does not find it" in json.dumps(result), result
+    answers["instances"] = (500, b"", {})
+    result = web("send", "out", "--json", at=there)
+    assert (result["accepted"], result["checked"]) == (3, False) and "not asked afterwards" in said[-1] and "status 500" in said[-1], said[-1]
+    del answers["instances"]
+    for answer in ((302, b"", {"Location": "/web/studies"}), (401, b"", {}), "stall", "hang up", (200, b" " * 20_000_000, {}), (200, b"", "endless")):
+        answers["POST"] = answer
+        web("send", "out", at=there, rc=7, timeout="2" if answer == "stall" else "60")
+    # Lost on the way: what was sent before is told, and what was not.
+    posts.clear()
+    answers["POST"] = lambda n: (200, as_json({"00081199": {"vr": "SQ", "Value": [{"00081155": text(f"1.2.3.50.{i}")} for i in range(130)]}}), {}) if n == 1 else "hang up"
+    answers["instances"] = lambda query: (200, as_json([{"00080018": text(f"1.2.3.50.{i}")} for i in range(130)]), {})
+    result = web("send", "many", "--json", "--quiet", at=there, rc=8)
+    assert (result["objects"], result["accepted"], result["safe"], len(result["problems"])) == (130, 100, 100, 30), result
+    server.shutdown()
+    # TLS: its certificate must be of those that are trusted, and for its name.
+    run("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1", "-keyout", "web.key", "-out", "web.pem", "-addext", "subjectAltName=IP:127.0.0.1")
+    secure = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Liar)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain("web.pem", "web.key")
+    secure.socket = context.wrap_socket(secure.socket, server_side=True)
+    threading.Thread(target=secure.serve_forever, daemon=True).start()
+    there = f"https://127.0.0.1:{secure.server_address[1]}/web"
+    answers.clear()
+    assert "images" in web("fetch", *keys, "--dicomweb-ca", "web.pem", at=there)
+    assert "ertificate" in web("fetch", *keys, at=there, rc=7)
+    assert "ertificate" in web("fetch", *keys, "--dicomweb-ca", "web.pem", at=there.replace("127.0.0.1", "localhost"), rc=7)
+    web("fetch", *keys, "--dicomweb-ca", "nowhere.pem", at=there, rc=3)
+    secure.shutdown()
+    assert not any("tell-nobody" in text for text in said), "told"
+
+
 def ct_series_of(ask, uid):
     return next(i for i in ask("/series") if ask(f"/series/{i}")["MainDicomTags"]["SeriesInstanceUID"] == uid)
 
@@ -636,5 +1015,5 @@ def units():
         assert all(flag in known for flag in called if flag.startswith("--")), called
 
 
-{"orthanc": round_trip, "hostile": hostile, "watch": watch, "doors": doors, "tls": tls, "units": units}[part]()
+{"orthanc": round_trip, "hostile": hostile, "watch": watch, "doors": doors, "dicomweb": dicomweb, "dicomweb_lies": dicomweb_lies, "tls": tls, "units": units}[part]()
 print(f"pacs {part}: all as it should be")

@@ -1,10 +1,12 @@
 // send, fetch, receive: to and from a PACS.
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <ostream>
 
 #include "osteo/base/json_document.h"
+#include "osteo/pacs/dicomweb.h"
 #include "osteo/pacs/fetch.h"
 #include "osteo/pacs/receive.h"
 #include "osteo/pacs/send.h"
@@ -13,13 +15,47 @@
 namespace osteo {
 namespace {
 
-DicomPeer peer_of(const PeerFlags& p) {
-  if (p.peer.empty()) throw Error(ExitCode::usage, "no node is named", "--peer TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242");
-  DicomPeer peer = parse_peer(p.peer);
-  peer.own_ae = checked_ae(p.ae);
-  peer.timeout_s = p.timeout_s;
-  peer.tls = p.tls();
-  return peer;
+// Where to, or from where: one of both.
+struct Door {
+  std::optional<DicomPeer> node;
+  std::optional<WebServer> web;
+  std::string name;
+};
+
+Door door_of(const PeerOrWebFlags& p, const cli::Invocation& io) {
+  Door door;
+  if (p.dicomweb.empty()) {
+    if (!p.dicomweb_login.empty() || !p.dicomweb_ca.empty())
+      throw Error(ExitCode::usage, "a login or certificates for which server?", "--dicomweb URL");
+    if (p.peer.empty())
+      throw Error(ExitCode::usage, "no node is named", "--peer TITLE@HOST:PORT, like ORTHANC@127.0.0.1:4242, or --dicomweb URL");
+    door.node = parse_peer(p.peer);
+    door.node->own_ae = checked_ae(p.ae);
+    door.node->timeout_s = p.timeout_s;
+    door.node->tls = p.tls();
+    door.name = peer_text(*door.node);
+    return door;
+  }
+  for (const char* const flag : {"peer", "ae", "tls_ca", "tls_certificate", "tls_key"})
+    if (io.given.contains(flag))
+      throw Error(ExitCode::usage, "a DICOM node and a DICOMweb server at once", "--dicomweb has a login and certificates of its own");
+  door.web.emplace();
+  door.web->url = p.dicomweb;
+  door.web->ca = p.dicomweb_ca;
+  door.web->timeout_s = p.timeout_s;
+  door.web->flag = "--dicomweb";
+  const char* const given = std::getenv("OSTEO_DICOMWEB_LOGIN");
+  door.web->login = !p.dicomweb_login.empty() ? read_login(p.dicomweb_login) : given != nullptr ? given : "";
+  check_dicomweb(*door.web);
+  door.name = web_text(*door.web);
+  return door;
+}
+
+// Of a server: a terminal would take control characters for orders.
+std::string shown(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+  return text;
 }
 
 std::string megabytes(std::uint64_t bytes) {
@@ -41,10 +77,10 @@ std::vector<std::string> titles(const std::string& text) {
 cli::CommandInfo SendCommand::info() {
   return {
       "send",
-      "objects to a PACS, by C-STORE",
+      "objects to a PACS, by C-STORE or STOW-RS",
       "Sends a DICOM file, or all DICOM files of a folder, as they are: what was converted by to-slicer, save-series or a report leaves "
-      "only "
-      "by this command. Every answer of the node is judged, and the node is then asked which of the objects it has. Nothing is taken out "
+      "only by this command, to a DICOM node (--peer) or a DICOMweb server (--dicomweb). Every answer of the node is judged, and the node "
+      "is then asked which of the objects it has. Nothing is taken out "
       "without --deidentify: what names a person in the files is sent with them. Exit code 8 when some were refused or are not found "
       "afterwards.",
       {{"source", "a file or a folder"}},
@@ -52,7 +88,7 @@ cli::CommandInfo SendCommand::info() {
 }
 
 int SendCommand::run(const Params& p, cli::Invocation& io) {
-  const DicomPeer peer = peer_of(p);
+  const Door to = door_of(p, io);
   if (!p.key.empty() && !p.deidentify) throw Error(ExitCode::usage, "--key is for --deidentify", "add it, or leave the key out");
   DicomObjects all = list_objects({io.arguments[0]}, io.context.sub(0, p.dry_run && !p.deidentify ? 1 : 0.05));
   std::optional<TemporaryFolder> copies;
@@ -85,20 +121,17 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
   if (p.dry_run) {
     io.end_progress();
     if (io.common.json) {
-      io.out << Json{{"dry_run", true},
-                     {"peer", peer_text(peer)},
-                     {"kinds", listed},
-                     {"set_aside", all.set_aside.size()},
-                     {"left_out", left_out}}
+      io.out << Json{{"dry_run", true}, {"peer", to.name}, {"kinds", listed}, {"set_aside", all.set_aside.size()}, {"left_out", left_out}}
                     .dump(2)
              << '\n';
     } else {
-      io.out << "would send to " << peer_text(peer) << " as " << peer.own_ae << ":\n";
+      io.out << "would send to " << to.name << (to.node ? " as " + to.node->own_ae : "") << ":\n";
       for (const auto& [kind, n] : kinds) io.out << "  " << n.first << " x " << kind << ", " << megabytes(n.second) << '\n';
     }
     return static_cast<int>(left_out == 0 ? ExitCode::ok : ExitCode::partial);
   }
-  const SendReport report = send_objects(peer, all.objects, p.check, io.context.sub(0.1, 1));
+  const Context rest = io.context.sub(0.1, 1);
+  const SendReport report = to.web ? send_objects(*to.web, all.objects, p.check, rest) : send_objects(*to.node, all.objects, p.check, rest);
   io.end_progress();
   Json problems = Json::list();
   std::map<std::string, std::pair<int, std::string>> why;
@@ -111,7 +144,7 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
     if (n++ == 0) first = s.object.file.filename().string();
   }
   if (io.common.json) {
-    io.out << Json{{"peer", peer_text(peer)},
+    io.out << Json{{"peer", to.name},
                    {"kinds", listed},
                    {"objects", report.objects.size()},
                    {"accepted", report.accepted()},
@@ -124,8 +157,7 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
            << '\n';
   }
   if (!io.common.quiet) {
-    io.err << report.accepted() << " of " << report.objects.size() << " objects accepted by " << peer_text(peer) << " (" << megabytes(bytes)
-           << ")";
+    io.err << report.accepted() << " of " << report.objects.size() << " objects accepted by " << to.name << " (" << megabytes(bytes) << ")";
     io.err << (report.not_checked.empty() ? ", " + std::to_string(report.safe()) + " found there afterwards"
                                           : "; not asked afterwards: " + report.not_checked)
            << '\n';
@@ -137,24 +169,27 @@ int SendCommand::run(const Params& p, cli::Invocation& io) {
 cli::CommandInfo FetchCommand::info() {
   return {
       "fetch",
-      "a series from a PACS, by C-FIND and C-GET",
+      "a series from a PACS, by C-FIND and C-GET, or QIDO-RS and WADO-RS",
       "Without --out it lists the series that match (number, modality, images, description, UID); with it, the one that matches is fetched "
-      "as "
-      "it is, bit for bit, into a folder that appears whole or not at all. Names of patients are neither asked for nor shown. A node that "
+      "as it is, bit for bit, into a folder that appears whole or not at all. Names of patients are not shown. A node that "
       "gives nothing by C-GET can be made to send to 'osteo receive'.",
       {},
       "osteo fetch --peer ORTHANC@127.0.0.1:4242 --accession 4711 --modality CT"};
 }
 
 int FetchCommand::run(const Params& p, cli::Invocation& io) {
-  const DicomPeer peer = peer_of(p);
+  const Door from = door_of(p, io);
   if (!p.out.empty() && output_exists(p.out) && !(fs::is_directory(p.out) && fs::is_empty(p.out)))
     throw Error(ExitCode::cannot_write, "'" + p.out + "' exists already", "another folder: what was fetched is never replaced");
   const bool by_number = !p.series.empty() && p.series.find('.') == std::string::npos;
-  std::vector<RemoteSeries> found =
-      find_series(peer, {p.study, by_number ? "" : p.series, p.accession, p.patient_id, p.date, p.modality}, io.context);
+  const SeriesKeys keys{p.study, by_number ? "" : p.series, p.accession, p.patient_id, p.date, p.modality};
+  std::vector<RemoteSeries> found = from.web ? find_series(*from.web, keys, io.context) : find_series(*from.node, keys, io.context);
+  for (RemoteSeries& s : found) {
+    s.modality = shown(s.modality);
+    s.description = shown(s.description);
+  }
   if (by_number) std::erase_if(found, [&](const RemoteSeries& s) { return std::to_string(s.number) != p.series; });
-  if (found.empty()) throw Error(ExitCode::no_input, "nothing matches at " + peer_text(peer));
+  if (found.empty()) throw Error(ExitCode::no_input, "nothing matches at " + from.name);
   Json listed = Json::list();
   std::string lines;
   for (const RemoteSeries& s : found) {
@@ -182,7 +217,11 @@ int FetchCommand::run(const Params& p, cli::Invocation& io) {
   FetchLimits limits;
   limits.series_gb = p.series_gb;
   write_folder_atomically(
-      p.out, [](const fs::path&) {}, [&](const fs::path& folder) { report = fetch_series(peer, found[0], folder, limits, io.context); });
+      p.out, [](const fs::path&) {},
+      [&](const fs::path& folder) {
+        report = from.web ? fetch_series(*from.web, found[0], folder, limits, io.context)
+                          : fetch_series(*from.node, found[0], folder, limits, io.context);
+      });
   io.end_progress();
   if (io.common.json)
     io.out << Json{{"folder", p.out}, {"images", report.images}, {"bytes", report.bytes}, {"modality", found[0].modality}}.dump(2) << '\n';

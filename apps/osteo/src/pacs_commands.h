@@ -32,15 +32,27 @@ struct PeerFlags : TlsFlags {
   }
 };
 
+/// A DICOM node, or a DICOMweb server in its place.
+struct PeerOrWebFlags : PeerFlags {
+  std::string dicomweb, dicomweb_login, dicomweb_ca;
+  static void describe(PeerOrWebFlags& p, auto& visit) {
+    PeerFlags::describe(p, visit);
+    visit({"dicomweb", "in place of --peer: root of a DICOMweb server, like https://pacs.example/dicom-web"}, p.dicomweb);
+    visit({"dicomweb_login", "file, mode 600, with USER:PASSWORD (empty: OSTEO_DICOMWEB_LOGIN of the environment, or none)"},
+          p.dicomweb_login);
+    visit({"dicomweb_ca", "certificates to trust for it (PEM; empty: those of the system)"}, p.dicomweb_ca);
+  }
+};
+
 struct SendCommand {
-  struct Params : PeerFlags {
+  struct Params : PeerOrWebFlags {
     bool dry_run = false;
     bool check = true;
     bool deidentify = false;
     std::string key;
   };
   static void describe(Params& p, auto& visit) {
-    PeerFlags::describe(p, visit);
+    PeerOrWebFlags::describe(p, visit);
     visit({"dry_run", "say what would leave, and speak to nobody"}, p.dry_run);
     visit({"check", "ask afterwards which of the objects the node has (--no-check: believe its answers)"}, p.check);
     visit({"deidentify", "send copies as 'osteo deidentify' makes them; what it leaves out does not leave"}, p.deidentify);
@@ -67,12 +79,12 @@ struct DeidentifyCommand {
 };
 
 struct FetchCommand {
-  struct Params : PeerFlags {
+  struct Params : PeerOrWebFlags {
     std::string out, study, series, accession, patient_id, date, modality;
     double series_gb = 16;
   };
   static void describe(Params& p, auto& visit) {
-    PeerFlags::describe(p, visit);
+    PeerOrWebFlags::describe(p, visit);
     visit({"out", "folder for the series (empty: only list what there is; also -o)"}, p.out);
     visit({"study", "UID of a study"}, p.study);
     visit({"series", "UID of a series, or its number as listed"}, p.series);

@@ -6,6 +6,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "osteo/base/json_document.h"
+#include "osteo/dicom/objects.h"
 #include "osteo/scene/approval.h"
 #include "osteo/scene/case.h"
 #include "osteo/scene/hand_over.h"
@@ -43,10 +44,36 @@ std::optional<Pipeline> pipeline_at_hand(const fs::path& folder, const std::opti
   return case_pipeline(text, *recipe, scan, {}, false, folder, edits_of_case(folder, std::nullopt, same, notes), false);
 }
 
-CaseReport make_report(const fs::path& folder, const std::string& given, cli::Invocation& io) {
+CaseReport make_report(const fs::path& folder, const std::optional<Recipe>& recipe, const std::optional<Pipeline>& pipeline,
+                       cli::Invocation& io) {
+  return report_on(folder, recipe ? flags_of(*recipe) : " (made by an earlier version, which did not keep its flags)", pipeline,
+                   std::nullopt, io);
+}
+
+CaseReport make_report(const fs::path& folder, cli::Invocation& io) {
   const auto recipe = read_recipe(folder);
-  return report_on(folder, recipe ? flags_of(*recipe) : " (made by an earlier version, which did not keep its flags)",
-                   pipeline_at_hand(folder, recipe, given), std::nullopt, io);
+  return make_report(folder, recipe, pipeline_at_hand(folder, recipe, {}), io);
+}
+
+// The very series that the case was made from: a report under another patient's name would be worse than none.
+struct CaseSeries {
+  DicomScan scan;
+  const DicomSeries* series = nullptr;
+};
+CaseSeries series_of(const fs::path& folder, const std::optional<Pipeline>& pipeline, cli::Invocation& io) {
+  if (!pipeline)
+    throw Error(ExitCode::no_input, "the scan of '" + folder.string() + "' is not at hand, whose patient and study the object belongs to",
+                "--scan DICOM_FOLDER");
+  for (const PipelineNode& n : pipeline->nodes) {
+    const auto source = n.inputs.find("source");
+    if ((n.stage != "import" && n.stage != "import-bone") || source == n.inputs.end() || source->second.file.empty()) continue;
+    const auto wanted = n.params.find("series");
+    CaseSeries s;
+    s.scan = scan_dicom(source->second.file, {}, io.context.sub(0, 0.1));
+    s.series = &choose_series(s.scan, wanted == n.params.end() ? "" : wanted->second, source->second.file.string());
+    return s;
+  }
+  throw Error(ExitCode::usage, "'" + folder.string() + "' was not made from a DICOM series: there is no study that its report belongs to");
 }
 
 }  // namespace
@@ -59,19 +86,36 @@ cli::CommandInfo ReportCommand::info() {
       "outline, the bone from six sides, what was taken off, what the scan can resolve, structures and a line to sign. Its cuts are "
       "pictures of the "
       "patient, so it is not in the case. Without the scan the pictures of an earlier report of the same state are kept, or left out, and "
-      "it says so.",
+      "it says so. --dicom writes the PDF as a DICOM object too, of the patient and study of the scan, which is looked at for it: "
+      "'osteo send' brings it to a PACS.",
       {{"case", "a folder made by prepare"}},
       "osteo report CASE"};
 }
 
 int ReportCommand::run(const Params& p, cli::Invocation& io) {
-  const fs::path folder = io.arguments[0];
-  const CaseReport report = make_report(folder, p.scan, io);
+  const fs::path folder = io.arguments[0], object = p.dicom;
+  if (!object.empty()) {
+    if (object.extension() != ".dcm")
+      throw Error(ExitCode::usage, "'" + p.dicom + "' does not end in .dcm", "--dicom " + report_file(folder, ".dcm").string());
+    if (output_exists(object) && !io.common.force)
+      throw Error(ExitCode::cannot_write, "'" + p.dicom + "' exists already", "give another name, or --force to replace it");
+  }
+  const auto recipe = read_recipe(folder);
+  const auto pipeline = pipeline_at_hand(folder, recipe, p.scan);
+  std::optional<CaseSeries> of;
+  if (!object.empty()) of = series_of(folder, pipeline, io);
+  const CaseReport report = make_report(folder, recipe, pipeline, io);
+  if (of) {
+    save_encapsulated_pdf(read_text(report.pdf), "Bone for rehearsal: " + case_code(folder), object,
+                          {of->series, "Bone for rehearsal, not for diagnosis"}, io.context);
+    io.end_progress();
+    if (!io.common.quiet) io.err << "  " << p.dicom << " (names the patient)\n";
+  }
   if (io.common.json) {
-    io.out << Json{{"html", report.html.string()}, {"pdf", report.pdf.string()}, {"unchanged", report.unchanged},
-                   {"left_out", report.left_out},  {"code", case_code(folder)},  {"approval", approval_json(approval_of(folder))}}
-                  .dump(2)
-           << '\n';
+    Json said{{"html", report.html.string()}, {"pdf", report.pdf.string()}, {"unchanged", report.unchanged},
+              {"left_out", report.left_out},  {"code", case_code(folder)},  {"approval", approval_json(approval_of(folder))}};
+    if (of) said["dicom"] = p.dicom;
+    io.out << said.dump(2) << '\n';
   }
   return 0;
 }
@@ -103,13 +147,13 @@ int ApproveCommand::run(const Params& p, cli::Invocation& io) {
       throw Error(ExitCode::failed, "the report of '" + folder.string() + "' shows the case as it was before its last change",
                   "make it again with 'osteo report " + folder.string() + "', look at it, then approve");
     }
-    if (output_exists(report_file(folder, ".html")) && make_report(folder, {}, io).says_other) {
+    if (output_exists(report_file(folder, ".html")) && make_report(folder, io).says_other) {
       throw Error(ExitCode::failed, "the report of '" + folder.string() + "' was of another version of the program, and is made again",
                   "look at it, then approve");
     }
     approve(folder, p.by, p.note);
   }
-  const CaseReport report = make_report(folder, {}, io);
+  const CaseReport report = make_report(folder, io);
   const ApprovalNow now = approval_of(folder);
   if (io.common.json) {
     io.out << Json{{"approval", approval_json(now)}, {"report", report.html.string()}}.dump(2) << '\n';

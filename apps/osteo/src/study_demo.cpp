@@ -282,7 +282,7 @@ int run_study_demo(const std::string& name, int resamples, double level, bool mo
   std::vector<std::string> said;
   const std::size_t shown = movies ? make_movies(folder, rated, "SIMULATED-1", scene, io, said) : 0;
   io.context.progress(0.96, "analysis");
-  const study::Analysis analysis = study::analyse(study::read_study(folder), {level, resamples});
+  const study::Analysis analysis = study::analyse(study::read_study(folder), {level, resamples, {}});
   write_file(folder / "report.json", analysis.json.dump(2) + "\n");
   write_file(folder / "report.html", sheet_html(analysis.sheet));
   write_file(folder / "report.pdf", sheet_pdf(analysis.sheet));

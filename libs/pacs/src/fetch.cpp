@@ -108,7 +108,11 @@ class FileSizeLimit {
 
 }  // namespace
 
-std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& keys, const Context& context) {
+bool pacs::before(const RemoteSeries& a, const RemoteSeries& b) {
+  return std::tie(a.study, a.number, a.series) < std::tie(b.study, b.number, b.series);
+}
+
+void pacs::check_keys(const SeriesKeys& keys) {
   if (keys.study.empty() && keys.series.empty() && keys.accession.empty() && keys.patient_id.empty() && keys.study_date.empty())
     throw Error(ExitCode::usage, "say what to look for: a whole archive is not listed",
                 "--study, --series, --accession, --patient-id or --date");
@@ -117,6 +121,10 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
   for (const std::string& text : {keys.accession, keys.patient_id, keys.study_date, keys.modality})
     if (text.size() > 64 || text.find_first_of("\\*?") != std::string::npos)
       throw Error(ExitCode::usage, "'" + text + "' cannot be looked for", "at most 64 characters, without \\, * and ?");
+}
+
+std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& keys, const Context& context) {
+  pacs::check_keys(keys);
   pacs::Query query(peer);
   // Studies first: the study root asks for series of one study at a time (PS3.4 C.6.2).
   DcmDataset studies;
@@ -155,9 +163,7 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
       if (pacs::is_uid(r.study) && pacs::is_uid(r.series)) all.push_back(std::move(r));
     }
   }
-  std::ranges::sort(all, [](const RemoteSeries& a, const RemoteSeries& b) {
-    return std::tie(a.study, a.number, a.series) < std::tie(b.study, b.number, b.series);
-  });
+  std::ranges::sort(all, pacs::before);
   return all;
 }
 

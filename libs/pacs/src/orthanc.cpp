@@ -1,18 +1,17 @@
 #include "osteo/pacs/orthanc.h"
 
-#include <curl/curl.h>
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <memory>
 #include <optional>
 
+#include "http.h"
 #include "node.h"
 #include "osteo/base/json.h"
 #include "osteo/base/json_document.h"
@@ -30,18 +29,6 @@ struct WrongObject : Error {
   explicit WrongObject(const std::string& what) : Error(ExitCode::corrupt, what) {}
 };
 
-std::string bare(std::string url) {
-  while (url.ends_with('/')) url.pop_back();
-  return url;
-}
-
-bool own_machine(const std::string& url) {
-  std::string host = url.substr(url.find("://") + 3);
-  host = host.substr(0, host.find('/'));
-  if (!host.starts_with('[')) host = host.substr(0, host.find(':'));
-  return host == "localhost" || host == "127.0.0.1" || host.starts_with("[::1]");
-}
-
 struct Fd {
   int fd = -1;
   explicit Fd(int f) : fd(f) {}
@@ -57,58 +44,15 @@ void sync(const fs::path& path) {
   if (f.fd < 0 || ::fsync(f.fd) != 0) throw Error(ExitCode::cannot_write, std::string("the copy of a series: ") + std::strerror(errno));
 }
 
-class Http {
+class Rest {
  public:
-  Http(const OrthancServer& server, const Context& context) : server_(server), url_(bare(server.url)), context_(context) {
-    if (::curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK || (curl_ = ::curl_easy_init()) == nullptr)
-      throw Error(ExitCode::resources, "libcurl cannot be started");
-    set(CURLOPT_NOSIGNAL, 1L);
-    set(CURLOPT_PROTOCOLS_STR, "http,https");
-    set(CURLOPT_NOPROXY, "*");  // a login goes to the server and nobody else
-    set(CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
-    set(CURLOPT_SSL_VERIFYPEER, 1L);
-    set(CURLOPT_SSL_VERIFYHOST, 2L);
-    if (!server.ca.empty()) set(CURLOPT_CAINFO, server.ca.c_str());
-    if (!server.login.empty()) {
-      set(CURLOPT_HTTPAUTH, static_cast<long>(CURLAUTH_BASIC));
-      set(CURLOPT_USERPWD, server.login.c_str());
-    }
-    set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(server.timeout_s * 1000));
-    set(CURLOPT_LOW_SPEED_LIMIT, 1000L);
-    set(CURLOPT_LOW_SPEED_TIME, std::max(1L, static_cast<long>(server.timeout_s)));
-    set(CURLOPT_TIMEOUT, 3600L);
-    set(CURLOPT_NOPROGRESS, 0L);
-    set(CURLOPT_XFERINFODATA, &context_);
-    set(
-        CURLOPT_XFERINFOFUNCTION, +[](void* context, curl_off_t, curl_off_t, curl_off_t, curl_off_t) -> int {
-          return static_cast<const Context*>(context)->cancelled() ? 1 : 0;
-        });
-    set(CURLOPT_WRITEDATA, &to_);
-    set(
-        CURLOPT_WRITEFUNCTION, +[](char* data, std::size_t, std::size_t n, void* to) -> std::size_t {
-          Sink& s = *static_cast<Sink*>(to);
-          if (n > s.most - s.got) {
-            s.over = true;
-            return 0;
-          }
-          s.got += n;
-          if (s.file == nullptr) {
-            s.text.append(data, n);
-          } else if (std::fwrite(data, 1, n, s.file) != n) {
-            s.reason = errno;
-            return 0;
-          }
-          return n;
-        });
-  }
-  ~Http() { ::curl_easy_cleanup(curl_); }
-  Http(const Http&) = delete;
-  Http& operator=(const Http&) = delete;
+  Rest(const OrthancServer& server, const Context& context) : url_(web_text(server)), http_(server, context) {}
 
   /// None: the server has no such thing (any more).
   std::optional<Json> ask(const std::string& path) {
-    if (!get(path, kMostText, nullptr)) return std::nullopt;
-    auto said = Json::parse(to_.text);
+    const pacs::Reply reply = http_.ask({.path = path, .accept = {}, .most = kMostText});
+    if (!good(reply)) return std::nullopt;
+    auto said = Json::parse(reply.text);
     if (!said) throw wrong("gives an answer that is no JSON");
     return said;
   }
@@ -117,65 +61,34 @@ class Http {
   bool fetch(const std::string& path, const fs::path& file, std::uint64_t bytes) {
     const Fd fd(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> f(fd.fd < 0 ? nullptr : ::fdopen(::dup(fd.fd), "wb"), &std::fclose);
-    if (!f) throw Error(ExitCode::cannot_write, std::string("the copy of an object: ") + std::strerror(errno));
-    if (!get(path, bytes, f.get())) return false;
-    if (std::fflush(f.get()) != 0 || ::fsync(fd.fd) != 0)
-      throw Error(errno == ENOSPC ? ExitCode::resources : ExitCode::cannot_write,
-                  std::string("the copy of an object: ") + std::strerror(errno));
-    if (to_.got != bytes) throw WrongObject("an object is shorter than " + url_ + " says");
+    if (!f) throw lost();
+    std::uint64_t got = 0;
+    const pacs::Reply reply =
+        http_.ask({.path = path, .accept = {}, .most = kMostText, .take = [&](const pacs::Reply&, std::string_view piece) {
+                     if (piece.size() > bytes - got) throw WrongObject("an object is longer than " + url_ + " says");
+                     got += piece.size();
+                     if (std::fwrite(piece.data(), 1, piece.size(), f.get()) != piece.size()) throw lost();
+                   }});
+    if (!good(reply)) return false;
+    if (std::fflush(f.get()) != 0 || ::fsync(fd.fd) != 0) throw lost();
+    if (got != bytes) throw WrongObject("an object is shorter than " + url_ + " says");
     return true;
   }
 
-  [[nodiscard]] Error wrong(const std::string& what) const {
-    return {ExitCode::failed, url_ + " " + what, "is it the address of an Orthanc?"};
-  }
+  [[nodiscard]] Error wrong(const std::string& what) const { return http_.wrong(what, "is it the address of an Orthanc?"); }
 
  private:
-  struct Sink {
-    std::string text;
-    std::FILE* file = nullptr;
-    std::size_t most = 0, got = 0;
-    bool over = false;
-    int reason = 0;
-  };
-
-  template <class T>
-  void set(CURLoption option, T value) {
-    if (::curl_easy_setopt(curl_, option, value) != CURLE_OK)
-      throw Error(ExitCode::failed, "libcurl does not know an option that is needed", "7.85 or later");
-  }
-
-  bool get(const std::string& path, std::size_t most, std::FILE* file) {
-    context_.check_cancelled();
-    to_ = {};
-    to_.most = most;
-    to_.file = file;
-    set(CURLOPT_URL, (url_ + path).c_str());
-    const CURLcode done = ::curl_easy_perform(curl_);
-    context_.check_cancelled();
-    long status = 0;
-    ::curl_easy_getinfo(curl_, CURLINFO_RESPONSE_CODE, &status);
-    // An answer of another status may be of any length: the status is what counts.
-    if (status == 404 && (done == CURLE_OK || to_.over)) return false;
-    if (status == 401 || status == 403)
-      throw Error(ExitCode::failed, url_ + (server_.login.empty() ? " asks for a login" : " refuses the login"), "--orthanc-login FILE");
-    if (to_.reason != 0)
-      throw Error(to_.reason == ENOSPC ? ExitCode::resources : ExitCode::cannot_write,
-                  std::string("the copy of an object: ") + std::strerror(to_.reason));
-    if (to_.over && status == 200) {
-      if (file != nullptr) throw WrongObject("an object is longer than " + url_ + " says");
-      throw wrong("gives an answer of more than " + std::to_string(kMostText / 1'000'000) + " MB");
-    }
-    if (done != CURLE_OK) throw Error(ExitCode::failed, url_ + ": " + ::curl_easy_strerror(done), "tried again later");
-    if (status != 200) throw wrong("answers with status " + std::to_string(status));
+  [[nodiscard]] bool good(const pacs::Reply& reply) const {
+    if (reply.status == 404) return false;
+    if (reply.status != 200) throw wrong("answers with status " + std::to_string(reply.status));
     return true;
   }
+  static Error lost() {
+    return {errno == ENOSPC ? ExitCode::resources : ExitCode::cannot_write, std::string("the copy of an object: ") + std::strerror(errno)};
+  }
 
-  const OrthancServer& server_;
   const std::string url_;
-  const Context& context_;
-  CURL* curl_ = nullptr;
-  Sink to_;
+  pacs::Http http_;
 };
 
 struct State {
@@ -344,45 +257,20 @@ class Follower {
   const fs::path& folder_;
   const OrthancServer& server_;
   const Context& context_;
-  Http http_;
+  Rest http_;
   State state_;
 };
 
 }  // namespace
 
 void check_orthanc(const OrthancServer& server) {
-  const std::string& url = server.url;
-  const bool plain = url.starts_with("http://");
-  const auto bad = [](const char* why) {  // without the address: it may hold a password
-    return Error(ExitCode::usage, std::string("--orthanc: ") + why,
-                 "like https://orthanc.example:8042; user and password by --orthanc-login");
-  };
-  if (!plain && !url.starts_with("https://")) throw bad("the address begins with neither https:// nor http://");
-  if (url.find('@') != std::string::npos) throw bad("no user and password in the address: others could see them");
-  if (bare(url).size() <= url.find("://") + 3 ||
-      std::ranges::any_of(url, [](unsigned char c) { return c <= ' ' || c >= 127 || c == '?' || c == '#' || c == '\\'; }))
-    throw bad("that is no address of a server");
-  if (plain && !server.login.empty() && !own_machine(url))
-    throw Error(ExitCode::usage, "the password would go over the network in the clear", "https://, or a tunnel to 127.0.0.1");
-  if (!server.ca.empty()) require_readable(server.ca);
-}
-
-std::string read_login(const fs::path& file) {
-  require_readable(file);
-  struct stat s {};
-  if (::stat(file.c_str(), &s) != 0 || (s.st_mode & 077) != 0)
-    throw Error(ExitCode::usage, "others can read '" + file.string() + "'", "chmod 600 " + file.string());
-  std::string text = read_text(file);
-  while (text.ends_with('\n') || text.ends_with('\r')) text.pop_back();
-  if (text.find(':') == std::string::npos || text.starts_with(':') || text.find('\n') != std::string::npos)
-    throw Error(ExitCode::usage, "'" + file.string() + "' holds no login", "one line: USER:PASSWORD");
-  return text;
+  pacs::check_address(server);
 }
 
 void open_orthanc_folder(const fs::path& folder, const OrthancServer& server) {
   if (output_exists(folder / kState)) {
     const State s = read_state(folder);
-    if (s.url != bare(server.url))
+    if (s.url != web_text(server))
       throw Error(ExitCode::cannot_write, "'" + folder.string() + "' holds the series of " + s.url, "give another folder");
     return;
   }
@@ -392,7 +280,7 @@ void open_orthanc_folder(const fs::path& folder, const OrthancServer& server) {
                 "give another folder, or an empty one");
   make_output_folder(folder);
   ::chmod(folder.c_str(), 0700);
-  write_state(folder, {bare(server.url), "", 0, 0});
+  write_state(folder, {web_text(server), "", 0, 0});
 }
 
 void follow_orthanc(const fs::path& folder, const OrthancServer& server, const Context& context) {

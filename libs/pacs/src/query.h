@@ -1,11 +1,17 @@
-// Questions to a node by C-FIND, study root. Private to libs/pacs.
+// Questions to a node: what may be asked, and asking by C-FIND, study root. Private to libs/pacs.
 #pragma once
 #include <memory>
 #include <vector>
 
 #include "node.h"
+#include "osteo/pacs/fetch.h"
 
 namespace osteo::pacs {
+
+/// Error(usage) when nothing is asked for, or what cannot be (a UID that is none, wildcards).
+void check_keys(const SeriesKeys& keys);
+/// By study and number.
+[[nodiscard]] bool before(const RemoteSeries& a, const RemoteSeries& b);
 
 class Query : public Scu {
  public:

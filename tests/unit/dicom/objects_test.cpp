@@ -105,6 +105,38 @@ TEST(Objects, TagsOfTheSourceThatDicomDoesNotAllow) {
   EXPECT_EQ(text_of(out / "stl.dcm", DCM_StudyDate), "");
 }
 
+// PS3.3 A.45.1; pydicom and dciodvfy read it in pacs.doors.
+TEST(EncapsulatedPdf, HoldsThePagesAndBelongsToTheStudy) {
+  const fs::path out = fs::path(testing::TempDir()) / "encapsulated-pdf";
+  fs::remove_all(out);
+  fs::create_directories(out);
+  const std::string pages = "%PDF-1.5 odd";  // of an even number of bytes, then of an odd one
+  for (const std::string& pdf : {pages, pages + "!"}) {
+    save_encapsulated_pdf(pdf, "Words", out / "a.dcm");
+    DcmFileFormat file;
+    ASSERT_TRUE(file.loadFile((out / "a.dcm").c_str()).good());
+    const Uint8* bytes = nullptr;
+    Uint32 length = 0;
+    unsigned long stored = 0;
+    ASSERT_TRUE(file.getDataset()->findAndGetUint8Array(DCM_EncapsulatedDocument, bytes, &stored).good());
+    ASSERT_TRUE(file.getDataset()->findAndGetUint32(DCM_EncapsulatedDocumentLength, length).good());
+    EXPECT_EQ(length, pdf.size());
+    EXPECT_EQ(stored % 2, 0U);
+    EXPECT_EQ(std::string(reinterpret_cast<const char*>(bytes), length), pdf);
+    EXPECT_EQ(text_of(out / "a.dcm", DCM_PatientName), "OSTEOTOME^ANONYMOUS");
+    EXPECT_FALSE(file.getDataset()->tagExists(DCM_FrameOfReferenceUID));
+  }
+  // Same pages, same UIDs; in another study, or other pages: others.
+  const auto ids = [&](const std::string& pdf) {
+    save_encapsulated_pdf(pdf, "Words", out / "b.dcm");
+    return text_of(out / "b.dcm", DCM_SOPInstanceUID) + " " + text_of(out / "b.dcm", DCM_SeriesInstanceUID);
+  };
+  EXPECT_EQ(ids(pages), ids(pages));
+  EXPECT_NE(ids(pages), ids(pages + "!"));
+  EXPECT_THROW(save_encapsulated_pdf("<html>", "Words", out / "c.dcm"), Error);
+  EXPECT_FALSE(fs::exists(out / "c.dcm"));
+}
+
 // Bits as bytes of 0 and 255, a fractional segmentation.
 void make_fractional(const fs::path& from, const fs::path& to) {
   DcmFileFormat file;

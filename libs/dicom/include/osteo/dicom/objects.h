@@ -1,7 +1,8 @@
-// What goes back into a PACS: label maps as DICOM SEG, surfaces as encapsulated STL.
+// What goes back into a PACS: label maps as DICOM SEG, surfaces as encapsulated STL, reports as encapsulated PDF.
 #pragma once
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "osteo/base/context.h"
 #include "osteo/data/tri_mesh.h"
@@ -41,5 +42,11 @@ void save_segmentation_on_source(const Labels& labels, const std::filesystem::pa
 /// Encapsulated STL (PS3.3 A.85.1): the surface as binary STL in LPS mm inside a DICOM file. Atomic.
 void save_encapsulated_stl(const TriMesh& mesh, const std::filesystem::path& path, const DicomObjectOptions& options = {},
                            const Context& context = {});
+
+/// Encapsulated PDF (PS3.3 A.45.1): the bytes of a PDF, in a series of its own of the source's study, modality DOC, not verified. `title`
+/// names the document. It has no frame of reference. Atomic. Same pages, same study: same UIDs. Errors: usage for what does not begin
+/// as a PDF or is over 4 GB, cannot_write.
+void save_encapsulated_pdf(std::string_view pdf, const std::string& title, const std::filesystem::path& path,
+                           const DicomObjectOptions& options = {}, const Context& context = {});
 
 }  // namespace osteo

@@ -4,27 +4,20 @@
 //   FOLDER/.series-HASH/     one that is being fetched
 // Source: the REST interface of the Orthanc Book ("Tracking changes").
 #pragma once
-#include <string>
-
 #include "osteo/base/context.h"
 #include "osteo/base/files.h"
+#include "osteo/pacs/web.h"
 
 namespace osteo {
 
-struct OrthancServer {
-  std::string url;          ///< http:// or https://, without user, query and fragment
-  std::string login;        ///< USER:PASSWORD; empty: none is asked for. Never told.
-  fs::path ca;              ///< certificates that are trusted (PEM); empty: those of the system
-  double timeout_s = 30;    ///< for the connection, and for less than 1000 bytes a second
+struct OrthancServer : WebServer {
+  OrthancServer() { flag = "--orthanc"; }
   double object_gb = 2;     ///< a larger object is not taken
   double keep_free_mb = 0;  ///< on the folder's disk; with less, nothing is fetched
 };
 
 /// Error(usage) for an address that is none, has a user in it, or would send the login over a network in the clear.
 void check_orthanc(const OrthancServer& server);
-
-/// A login from a file that only its owner may read: one line, USER:PASSWORD. Errors: usage, no_input, cannot_read.
-[[nodiscard]] std::string read_login(const fs::path& file);
 
 /// Makes the folder when it is not there (mode 700). Error(cannot_write) where it holds something else, or the copy of another server.
 void open_orthanc_folder(const fs::path& folder, const OrthancServer& server);
