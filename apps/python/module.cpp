@@ -151,6 +151,8 @@ Data data_of(const py::handle& h, const Port& port) {
   if (py::isinstance<SparseGrid>(h)) return h.cast<SparseGrid>();
   if (py::isinstance<TriMesh>(h)) return Surface(h.cast<std::shared_ptr<TriMesh>>());
   if (py::isinstance<TetMesh>(h)) return Tets(h.cast<std::shared_ptr<TetMesh>>());
+  if (py::isinstance<py::dict>(h) && std::ranges::find(port.kinds, DataKind::document) != port.kinds.end())
+    return Document{py::module_::import("json").attr("dumps")(h).cast<std::string>()};
   if (py::hasattr(h, "__fspath__") || py::isinstance<py::str>(h)) {
     const std::string path = py::str(py::module_::import("os").attr("fspath")(h));
     return load_data(path, port.kinds);
@@ -180,8 +182,13 @@ py::object object_of(const Data& data) {
       const auto picture = std::make_shared<Picture>(std::get<Picture>(data));
       return view<std::uint8_t>(picture, picture->rgb.data(), {picture->height, picture->width, 3});
     }
-    case DataKind::document:
-      return py::module_::import("json").attr("loads")(std::get<Document>(data).json);
+    case DataKind::document: {
+      // An .inp, .svg or .vtu is a text.
+      const std::string& text = std::get<Document>(data).json;
+      const std::size_t first = text.find_first_not_of(" \t\r\n");
+      if (first == std::string::npos || (text[first] != '{' && text[first] != '[')) return py::str(text);
+      return py::module_::import("json").attr("loads")(text);
+    }
   }
   return py::none();
 }

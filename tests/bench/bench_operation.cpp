@@ -126,6 +126,7 @@ void pieces(const BrickGrid& bone, const Context& context) {
   std::map<std::string, std::vector<std::uint64_t>> held;
   for (int run = 0; run < 5; ++run) {
     Script script = make_default_script(World(BrickGrid(bone)), true, burr_index(BurrKind::cutting, 4), 3);
+    for (auto& w : script.waypoints) w.drill_on = false;  // else undo would take back a stroke, and not the split
     RehearsalOptions o;
     o.follow = {true, true, false};
     o.haptics.device = SpringHand::traits();

@@ -101,6 +101,21 @@ fails(lambda: osteo.Surface(surface.points_mm.astype(float), surface.triangles),
 fails(lambda: osteo.Surface(surface.points_mm, surface.triangles, surface.normals[:2].copy()), 2, "normals")
 assert osteo.__version__.count(".") == 2
 
+# Documents: a dict goes in; JSON comes out as one, an input file of CalculiX as text.
+corners = np.array([(x, y, z) for z in (-20, -10) for y in (20, 30) for x in (40, 50)], np.float32)
+box = osteo.Surface(corners, np.array([(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2),
+                                       (1, 3, 7), (1, 7, 5)], np.uint32))
+mesh = osteo.tetrahedralize(box, method="grid", spacing_mm=2.5)
+pressed = {"osteotome_tissue": 1, "material": {"young_kpa": 1000, "poisson": 0.3}, "fixed": [{"box_mm": [[39, 19, -21], [51, 31, -19.9]]}],
+           "loads": [{"name": "press", "forces": [{"box_mm": [[39, 19, -10.1], [51, 31, -9]], "total_n": [0, 0, -1]}]}]}
+solved = osteo.fem(mesh, pressed, law="linear")
+assert isinstance(solved.report, dict) and abs(solved.report["reaction_n"][2] - 1) < 1e-6, solved.report
+assert isinstance(solved.inp, str) and "*ELASTIC" in solved.inp and solved.nodes.startswith("<?xml")
+fails(lambda: osteo.fem(mesh, {**pressed, "gravity": 1}), 2, "gravity")
+fails(lambda: osteo.fem(box, pressed), 2, "mesh")
+stiff = osteo.bone_stiffness(mesh, ct, pressed, density_per_1000_hu=0.75)
+assert stiff.report["materials"] > 3 and abs(stiff.report["volume_mm3"] - 1000) < 1e-6 and "*MATERIAL, NAME=M3" in stiff.inp
+
 # VTK's own module, where it is.
 try:
     from vtkmodules.util import numpy_support

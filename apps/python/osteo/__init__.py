@@ -18,6 +18,8 @@ from .vtk import from_vtk, to_vtk
 
 _types = {"source": "os.PathLike | str", "image": "Image", "labels": "Labels", "grid": "Grid", "surface": "Surface", "tets": "Tets",
           "picture": "numpy.ndarray", "document": "dict"}
+# An .inp, .svg or .vtu that a stage makes is a text.
+_made = {**_types, "document": "dict | str"}
 _params = {"flag": "bool", "int": "int", "number": "float", "text": "str", "triple": "Sequence[float]", "list": "Sequence[int]", "choice": "str"}
 
 
@@ -32,7 +34,7 @@ def _input_type(port):
 
 
 def _output_type(port):
-    return _types[port["kinds"][0]] + (" | None" if port["optional"] else "")
+    return _made[port["kinds"][0]] + (" | None" if port["optional"] else "")
 
 
 def _signature(stage):

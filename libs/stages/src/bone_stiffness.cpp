@@ -151,9 +151,9 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   std::size_t of_regions = 0;
   for (std::size_t t = 0; t < materials.size(); ++t) {
     const Material& own = problem.materials[problem.materials.size() == 1 ? 0 : t];
-    const bool general = own.young_mpa == problem.general.young_mpa && own.poisson == problem.general.poisson;
-    of_regions += general ? 0 : 1;
-    materials[t] = general ? Material{bone.young_mpa[t], problem.general.poisson} : own;
+    const bool region = !problem.in_region.empty() && problem.in_region[t] != 0;
+    of_regions += region ? 1 : 0;
+    materials[t] = region ? own : Material{bone.young_mpa[t], own.poisson};
   }
   problem.materials = materials;
   const Elements elements = elements_for(LawChoice::automatic, p.order, problem, mesh);

@@ -31,15 +31,16 @@ class ProblemReader {
   TissueProblem read(bool needs_loads) {
     const JsonValue& root = file_.root();
     file_.require_format("osteotome_tissue");
-    file_.allow(root, "", Names{"osteotome_tissue", "$schema", "about", "law", "order", "material", "regions", "fixed", "loads"});
+    allow(root, "", Names{"osteotome_tissue", "$schema", "about", "law", "order", "material", "regions", "fixed", "loads"});
     problem_.law = named<ElasticLaw>(root, "law", {"linear", "stvk", "neo_hooke", "neo_hooke_split", "corotated"});
     problem_.order = named<TetOrder>(root, "order", {"t4", "t10", "t4_mean"});
     const JsonValue& general = file_.need(root, "", "material");
-    file_.allow(general, "material", Names{"young_kpa", "poisson", "density_kg_m3", "about"});
+    allow(general, "material", Names{"young_kpa", "poisson", "density_kg_m3", "about"});
     problem_.general = material_of(file_, general, "material");
     density_.assign(mesh_.tets.size(), density_of(general, "material").value_or(0));
     const auto& regions = items(root, "regions", false);
     problem_.materials.assign(regions.empty() ? 1 : mesh_.tets.size(), problem_.general);
+    problem_.in_region.assign(regions.empty() ? 0 : mesh_.tets.size(), 0);
     each(regions, "region", [&](const JsonValue& r, const std::string& where) { read_region(r, where); });
     each(items(root, "fixed", true), "fixed", [&](const JsonValue& f, const std::string& where) { read_fixed(f, where); });
     const auto& loads = items(root, "loads", needs_loads);
@@ -49,6 +50,14 @@ class ProblemReader {
   }
 
  private:
+  // These keys and no others; what is for people is text.
+  void allow(const JsonValue& object, const std::string& where, const Names& keys) const {
+    file_.allow(object, where, keys);
+    for (const char* const key : {"name", "about"}) {
+      if (const JsonValue* const found = object.find(key); found != nullptr)
+        (void)file_.text(*found, (where.empty() ? "" : where + ": ") + ('"' + std::string(key) + '"'));
+    }
+  }
   // One of the names, in the order of the enum's values.
   template <class E>
   [[nodiscard]] std::optional<E> named(const JsonValue& object, const std::string& key, const Names& names) const {
@@ -80,7 +89,7 @@ class ProblemReader {
   [[nodiscard]] Place place(const JsonValue& v, const std::string& where, const Names& others) const {
     Names known{"name", "about", "box_mm", "at_mm", "radius_mm"};
     known.insert(known.end(), others.begin(), others.end());
-    file_.allow(v, where, known);
+    allow(v, where, known);
     const JsonValue *const box = v.find("box_mm"), *const at = v.find("at_mm"), *const radius = v.find("radius_mm");
     if ((box != nullptr) == (at != nullptr) || (at != nullptr) != (radius != nullptr))
       throw file_.wrong(v, where + ": it needs a place: \"box_mm\", or \"at_mm\" with \"radius_mm\"", kWhere);
@@ -106,6 +115,7 @@ class ProblemReader {
       for (const std::uint32_t p : mesh_.tets[t]) middle += from_floats(mesh_.points_mm[p]) / 4;
       if (!in(middle)) continue;
       problem_.materials[t] = m;
+      problem_.in_region[t] = 1;
       if (density) density_[t] = *density;
       ++hit;
     }
@@ -152,7 +162,7 @@ class ProblemReader {
     const Names kinds{"forces", "surfaces", "volumes", "gravity_m_s2", "moved", "contacts"};
     Names known{"name", "about"};
     known.insert(known.end(), kinds.begin(), kinds.end());
-    file_.allow(l, where, known);
+    allow(l, where, known);
     if (std::none_of(kinds.begin(), kinds.end(), [&](const std::string& k) { return l.find(k) != nullptr; }))
       throw file_.wrong(l, where + ": it has none of \"forces\", \"surfaces\", \"volumes\", \"gravity_m_s2\", \"moved\" and \"contacts\"");
     TissueLoad load;
@@ -254,7 +264,7 @@ class ProblemReader {
   }
 
   void add_contact(TissueLoad& load, const JsonValue& c, const std::string& where) {
-    file_.allow(c, where, Names{"name", "about", "at_mm", "normal", "radius_mm", "stiffness_n_per_mm"});
+    allow(c, where, Names{"name", "about", "at_mm", "normal", "radius_mm", "stiffness_n_per_mm"});
     const Vec3 at = triple(file_.need(c, where, "at_mm"), where + ": \"at_mm\"", kFarMm);
     const JsonValue *const normal = c.find("normal"), *const radius = c.find("radius_mm");
     if ((normal != nullptr) == (radius != nullptr))

@@ -32,9 +32,10 @@ namespace osteo {
 /// *SOLID SECTION; *BOUNDARY, within a *STEP with movements too; each *STEP a load of *CLOAD and *DLOAD (P1 to P4; GRAV, with *DENSITY),
 /// NLGEOM says which law.
 struct TissueProblem {
-  Material general;                  ///< of what no region has
-  std::vector<Material> materials;   ///< one a tetrahedron, or one for all
-  std::vector<std::uint32_t> fixed;  ///< points
+  Material general;                     ///< of what no region has
+  std::vector<Material> materials;      ///< one a tetrahedron, or one for all
+  std::vector<std::uint8_t> in_region;  ///< one a tetrahedron: whether a region of JSON has it; or empty: there is none
+  std::vector<std::uint32_t> fixed;     ///< points
   std::vector<Slider> sliders;
   std::vector<std::string> load_names;
   std::vector<TissueLoad> loads;  ///< each with `fixed` and `sliders`, and what it holds or moves besides
