@@ -2,6 +2,7 @@
 # Makes the Debian packages: osteo, osteo-rehearse, libosteo-dev and python3-osteo without copyleft options, osteo-full with them.
 # usage: apps/packaging/debs.sh OUT [--free-only]      builds in build/deb-free and build/deb-full
 set -euo pipefail
+umask 022 # what is made while packing is for all to read
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 out=${1:?usage: apps/packaging/debs.sh OUT [--free-only]}
 mkdir -p "$out"
