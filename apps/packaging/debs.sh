@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Makes the Debian packages: osteo, osteo-rehearse and libosteo-dev without copyleft options, osteo-full with them.
+# Makes the Debian packages: osteo, osteo-rehearse, libosteo-dev and python3-osteo without copyleft options, osteo-full with them.
 # usage: apps/packaging/debs.sh OUT [--free-only]      builds in build/deb-free and build/deb-full
 set -euo pipefail
+umask 022 # what is made while packing is for all to read
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 out=${1:?usage: apps/packaging/debs.sh OUT [--free-only]}
 mkdir -p "$out"
@@ -22,5 +23,5 @@ make() { # FOLDER cmake-options...
 }
 mkdir -p "$root/build"
 make deb-free -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF -DOSTEO_MOVIE=OFF
-[ "${2:-}" = --free-only ] || make deb-full -DOSTEO_WINDOW=OFF
+[ "${2:-}" = --free-only ] || make deb-full -DOSTEO_WINDOW=OFF -DOSTEO_PYTHON=OFF
 ls -l "$out"/*.deb

@@ -128,7 +128,7 @@ _osteo() {
     fetch) flags="$flags --peer --ae --timeout-s --tls-ca --tls-certificate --tls-key --dicomweb --dicomweb-login --dicomweb-ca --out --study --series --accession --patient-id --date --modality --series-gb" ;;
     receive) flags="$flags --ae --bind --port --allow --anybody --associations --object-gb --folder-gb --keep-free-gb --memory-mb --timeout-s --association-s --quiet-s --metrics --tls-ca --tls-certificate --tls-key" ;;
     watch) flags="$flags --rules --out --quiet-s --poll-s --jobs --memory-mb --minutes --retries --keep-free-mb --orthanc --orthanc-login --orthanc-ca --timeout-s --object-gb --once --no-report --metrics" ;;
-    doctor) flags="$flags --seconds --rate-hz" ;;
+    doctor) flags="$flags --seconds --rate-hz --server --inbox --cases --rules --metrics --login --ae --allow --bind --port --keep-free-gb --jobs --memory-mb --no-report --tls-ca --tls-certificate --tls-key" ;;
     demo) flags="$flags --out --seconds --axes" ;;
     bench) flags="$flags" ;;
     docs) flags="$flags --check --shared" ;;

@@ -1,5 +1,5 @@
-# Debian packages by CPack; apps/packaging/debs.sh makes them all. A tree without copyleft options makes osteo, osteo-rehearse and libosteo-dev;
-# one with them makes osteo-full, which stands in for osteo.
+# Debian packages by CPack; apps/packaging/debs.sh makes them all. A tree without copyleft options makes osteo, osteo-rehearse, libosteo-dev and
+# python3-osteo; one with them makes osteo-full, which stands in for osteo.
 set(OSTEO_PACKAGER "Osteotome developers <osteotome@example.org>" CACHE STRING "Who made the packages: name and address; set it before giving them away")
 if(OSTEO_CGAL OR OSTEO_TETGEN OR OSTEO_CERES OR OSTEO_MOVIE)
   set(OSTEO_DEB_SERVER osteo-full)
@@ -10,10 +10,14 @@ else()
   if(OSTEO_WINDOW)
     list(APPEND deb_components window)
   endif()
+  if(TARGET osteo_python)
+    list(APPEND deb_components python)
+  endif()
 endif()
 set(deb_name_server ${OSTEO_DEB_SERVER})
 set(deb_name_window osteo-rehearse)
 set(deb_name_dev libosteo-dev)
+set(deb_name_python python3-osteo)
 
 # The day of the commit, so that two builds of one commit give the same bytes.
 find_program(GIT git)
@@ -80,6 +84,10 @@ if(window IN_LIST deb_components)
   osteo_sbom(window osteo-rehearse "osteo-rehearse;osteo-edit;osteo-console;osteo-experiment" OSTEO_WINDOW)
 endif()
 
+if(python IN_LIST deb_components)
+  osteo_sbom(python python3-osteo osteo_python OSTEO_PYTHON)
+endif()
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME osteo)
 set(CPACK_PACKAGE_VERSION ${OSTEO_DEB_VERSION})
@@ -116,6 +124,21 @@ foreach(row ${rows})
   list(APPEND dev_needs ${name})
 endforeach()
 list(JOIN dev_needs ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS)
+if(python IN_LIST deb_components)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-osteo)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  # The module is made for one version of Python.
+  get_target_property(made_for osteo_python PYTHON_MADE_FOR)
+  string(REGEX MATCH "[0-9]+$" minor ${made_for})
+  math(EXPR minor "${minor} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= ${made_for}~), python3 (<< 3.${minor}~), python3-numpy, libegl1, libgl1-mesa-dri")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-vtk9, osteo")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/apps/packaging/deb/python3-osteo/postinst
+    ${PROJECT_SOURCE_DIR}/apps/packaging/deb/python3-osteo/prerm)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Osteotome from Python
+Every stage as a function, from a CT to bone, surfaces and distances as numpy arrays; sessions as arrays, and the servo that drills.
+Built without the copyleft options. Not a medical device.")
+endif()
 if(OSTEO_DEB_SERVER STREQUAL osteo-full)
   set(CPACK_DEBIAN_SERVER_PACKAGE_PROVIDES "osteo (= ${OSTEO_DEB_VERSION})")
   set(CPACK_DEBIAN_SERVER_PACKAGE_CONFLICTS osteo)

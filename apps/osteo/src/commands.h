@@ -166,19 +166,6 @@ struct TrackPenCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
-struct DoctorCommand {
-  struct Params {
-    double seconds = 2;
-    double rate_hz = 1000;
-  };
-  static void describe(Params& p, auto& visit) {
-    visit({"seconds", "for which the loop's lateness is measured", "s", 0.1, 600}, p.seconds);
-    visit({"rate_hz", "of that loop", "Hz", 100, 10000}, p.rate_hz);
-  }
-  static cli::CommandInfo info();
-  static int run(const Params& params, cli::Invocation& invocation);
-};
-
 struct ExportCommand {
   struct Params {};
   static void describe(Params&, auto&) {}

@@ -19,6 +19,8 @@
 #include "osteo/devices/devices.h"
 #include "osteo/rt/loop.h"
 #include "osteo/view/offscreen.h"
+#include "pacs_commands.h"
+#include "server_doctor.h"
 
 namespace osteo {
 namespace {
@@ -81,6 +83,21 @@ std::string processor() {
 }
 
 }  // namespace
+
+std::string opengl_here() {
+  try {
+    OffscreenWindow window(64, 64);
+    static_cast<void>(window.render());
+    const std::string all = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
+    const auto line = [&](const std::string& key) {
+      const auto at = all.find(key);
+      return at == std::string::npos ? std::string() : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
+    };
+    return line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
+  } catch (const Error&) {
+    return {};
+  }
+}
 
 cli::CommandInfo DevicesCommand::info() {
   return {
@@ -154,15 +171,22 @@ int DevicesCommand::run(const Params& p, cli::Invocation& io) {
 
 cli::CommandInfo DoctorCommand::info() {
   return {"doctor",
-          "what this machine can do for a rehearsal, and what to change",
+          "what this machine can do for a rehearsal or as a server, and what to change",
           "Real-time priority, memory lock, lateness of a loop as the servo runs it, devices, OpenGL, audio. Exit code 0 also when "
-          "something is "
-          "missing: the advice says what.",
+          "something is missing: the advice says what. With --server what 'osteo receive', 'osteo watch' and 'osteo batch' need, a line "
+          "each: memory, clock, folders and room in them, title, port, TLS and login files, counters, rules, pictures, systemd's units, "
+          "Slurm. What is not named is not looked at. 'good', 'none' (not there, not needed), 'care' (works, but), 'bad' (will not work): "
+          "with a 'bad' the exit code is 7. To be run as the user of the services.",
           {},
           "osteo doctor --seconds 10"};
 }
 
 int DoctorCommand::run(const Params& p, cli::Invocation& io) {
+  if (p.server) return doctor_of_server(p, io);
+  if (p.no_report) throw Error(ExitCode::usage, "--no-report is for --server", "osteo doctor --server ...");
+  for (const std::string* const given :
+       {&p.inbox, &p.cases, &p.rules, &p.metrics, &p.login, &p.allow, &p.tls_ca, &p.tls_certificate, &p.tls_key})
+    if (!given->empty()) throw Error(ExitCode::usage, "'" + *given + "' is looked at with --server alone", "osteo doctor --server ...");
   Json j;
   std::vector<std::string> advice;
   utsname u{};
@@ -214,21 +238,12 @@ int DoctorCommand::run(const Params& p, cli::Invocation& io) {
       advice.push_back("allow " + f.info.path + " for your user: KERNEL==\"hidraw*\", ATTRS{idVendor}==\"" + hex4(f.info.vendor) +
                        "\", TAG+=\"uaccess\" in /etc/udev/rules.d/70-osteotome.rules");
   }
-  std::string opengl;
-  try {
-    OffscreenWindow window(64, 64);
-    static_cast<void>(window.render());
-    const std::string all = std::string(window.window()->ReportCapabilities()).substr(0, 4096);
-    const auto line = [&](const std::string& key) {
-      const auto at = all.find(key);
-      return at == std::string::npos ? std::string() : all.substr(at + key.size(), all.find('\n', at) - at - key.size());
-    };
-    opengl = line("OpenGL renderer string:  ") + ", " + line("OpenGL version string:  ");
-    if (opengl.find("llvmpipe") != std::string::npos)
-      advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
-  } catch (const Error& e) {
+  std::string opengl = opengl_here();
+  if (opengl.empty()) {
     opengl = "none";
     advice.push_back("there is no OpenGL: install libegl1 and libgl1-mesa-dri");
+  } else if (opengl.find("llvmpipe") != std::string::npos) {
+    advice.push_back("OpenGL is drawn by the processor: a graphics card makes the picture smooth");
   }
   j["opengl"] = opengl;
   const bool display = std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr, audio = fs::exists("/dev/snd");

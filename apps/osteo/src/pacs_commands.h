@@ -7,6 +7,7 @@
 #include "osteo/cli/command.h"
 #include "osteo/pacs/deidentify.h"
 #include "osteo/pacs/peer.h"
+#include "osteo/pacs/rules.h"
 
 namespace osteo {
 
@@ -127,6 +128,9 @@ struct ReceiveCommand {
   static int run(const Params& params, cli::Invocation& invocation);
 };
 
+/// Rules whose pipelines can be read and whose settings are known. Error(usage) and those of reading otherwise.
+std::vector<SeriesRule> checked_rules(const fs::path& file);
+
 struct WatchCommand {
   struct Params {
     std::string rules, out, metrics, orthanc, orthanc_login, orthanc_ca;
@@ -156,6 +160,40 @@ struct WatchCommand {
     visit({"once", "end when all that is there is done, instead of waiting for more"}, p.once);
     visit({"no_report", "write no report of each case: its cuts are pictures of the patient"}, p.no_report);
     visit({"metrics", "file for counters, in Prometheus' text form (empty: none)"}, p.metrics);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+/// What a rehearsal needs of this machine, or with --server what receive, watch and batch do.
+struct DoctorCommand {
+  struct Params : TlsFlags {
+    double seconds = 2;
+    double rate_hz = 1000;
+    bool server = false, no_report = false;
+    std::string inbox, cases, rules, metrics, login, allow, ae = "OSTEOTOME", bind = "127.0.0.1";
+    int port = 11112, jobs = 1;
+    double memory_mb = 4000, keep_free_gb = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"seconds", "for which the loop's lateness is measured", "s", 0.1, 600}, p.seconds);
+    visit({"rate_hz", "of that loop", "Hz", 100, 10000}, p.rate_hz);
+    visit({"server", "look at what receive, watch and batch need instead; the flags that follow are theirs, and are for this alone"},
+          p.server);
+    visit({"inbox", "folder of receive (empty: none is looked at)"}, p.inbox);
+    visit({"cases", "folder of watch's cases (empty: none)"}, p.cases);
+    visit({"rules", "of watch (empty: none)"}, p.rules);
+    visit({"metrics", "files for counters, with commas (empty: none)"}, p.metrics);
+    visit({"login", "files with USER:PASSWORD, with commas (empty: none)"}, p.login);
+    visit({"ae", "our title"}, p.ae);
+    visit({"allow", "titles of the nodes that may send, with commas"}, p.allow);
+    visit({"bind", "IPv4 address to listen on"}, p.bind);
+    visit({"port", "to listen on", "", 1, 65535}, p.port);
+    visit({"keep_free_gb", "of the disks of inbox and cases", "GB", 0, 1e6}, p.keep_free_gb);
+    visit({"jobs", "cases at a time", "", 1, 1024}, p.jobs);
+    visit({"memory_mb", "memory that a case may have", "MB", 0, 10000000}, p.memory_mb);
+    visit({"no_report", "cases get no reports, so pictures need not be drawn"}, p.no_report);
+    TlsFlags::describe(p, visit);
   }
   static cli::CommandInfo info();
   static int run(const Params& params, cli::Invocation& invocation);

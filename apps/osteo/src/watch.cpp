@@ -34,6 +34,12 @@ void check_rule(const SeriesRule& rule) {
 
 }  // namespace
 
+std::vector<SeriesRule> checked_rules(const fs::path& file) {
+  std::vector<SeriesRule> rules = read_series_rules(read_text(file), file);
+  for (const SeriesRule& rule : rules) check_rule(rule);
+  return rules;
+}
+
 cli::CommandInfo WatchCommand::info() {
   return {
       "watch",
@@ -53,8 +59,7 @@ cli::CommandInfo WatchCommand::info() {
 int WatchCommand::run(const Params& p, cli::Invocation& io) {
   if (p.rules.empty()) throw Error(ExitCode::usage, "by which rules?", "--rules FILE; pipelines/rules.json is one to begin with");
   if (p.out.empty()) throw Error(ExitCode::usage, "where to? osteo watch " + io.arguments[0] + " -o CASES");
-  const std::vector<SeriesRule> rules = read_series_rules(read_text(p.rules), p.rules);
-  for (const SeriesRule& rule : rules) check_rule(rule);
+  const std::vector<SeriesRule> rules = checked_rules(p.rules);
   WatchOptions o;
   o.folder = fs::absolute(io.arguments[0]);
   o.out = fs::absolute(p.out);
