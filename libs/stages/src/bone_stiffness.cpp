@@ -194,6 +194,7 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
          {"most_mpa", p.density.most_mpa},
          {"volume_share_below_least", bone.share_below},
          {"volume_share_above_most", bone.share_above},
+         {"volume_share_outside_ct", bone.share_outside},
          {"poisson", problem.general.poisson},
          {"load", problem.load_names[n]},
          {"order", name_of(elements.order)},
@@ -213,6 +214,9 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   };
   limited(bone.share_below, "softer than", p.density.least_mpa);
   limited(bone.share_above, "stiffer than", p.density.most_mpa);
+  if (bone.share_outside > 0)
+    context.warn(format_number(std::round(1e5 * bone.share_outside) / 1e3) +
+                 " % of the volume lies outside of the CT: the values at its border were taken there");
   TetMesh map = mesh;
   map.values_name = "young_mpa";
   map.values.resize(at_point.size());

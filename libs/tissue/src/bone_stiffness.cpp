@@ -11,7 +11,8 @@ namespace osteo {
 namespace {
 
 constexpr double kAshOfApparent = 0.598;
-constexpr int kMostAlongEdge = 64;  // samples: a tetrahedron of 32 voxels is no longer resolved finer
+constexpr double kMostOutside = 0.05;  // of the volume: more is another CT
+constexpr int kMostAlongEdge = 64;     // samples: a tetrahedron of 32 voxels is no longer resolved finer
 
 void require_usable(const BoneDensity& d, double step) {
   if (!(d.per_1000_hu > 0) || !std::isfinite(d.per_1000_hu) || !std::isfinite(d.at_0_hu))
@@ -59,8 +60,11 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
   s.young_mpa.resize(count);
   s.hu.resize(count);
   std::vector<double> volume(count);
-  std::vector<std::uint8_t> outside(count);
-  std::vector<double> grams(count);
+  std::vector<double> grams(count), outside(count);
+  for (const auto& p : mesh.points_mm) {
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+      throw Error(ExitCode::usage, "a point of the mesh is nowhere: its coordinates are not finite");
+  }
   parallel_for(count, 4096, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
     for (std::size_t t = begin; t < end; ++t) {
@@ -69,9 +73,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
       for (std::size_t c = 0; c < 4; ++c) {
         mm[c] = from_floats(mesh.points_mm[mesh.tets[t][c]]);
         at[c] = ct.frame.index_from_world(mm[c]);
-        for (std::size_t a = 0; a < 3; ++a) outside[t] |= !(at[c][a] >= -1 && at[c][a] <= ct.frame.dims[a]) ? 1 : 0;
       }
-      if (outside[t] != 0) continue;
       volume[t] = std::abs(dot(cross(mm[1] - mm[0], mm[2] - mm[0]), mm[3] - mm[0])) / 6;
       double longest = 0;
       for (std::size_t c = 0; c < 4; ++c) {
@@ -80,12 +82,16 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
       // Middles of the n^3 small tetrahedra that stand like the whole: their mean is that of the whole for anything linear.
       const int n = std::clamp(static_cast<int>(std::ceil(longest / apart_mm)), 2, kMostAlongEdge);
       double sum = 0, sum_hu = 0, sum_density = 0;
-      int samples = 0;
+      int samples = 0, beyond = 0;
       for (int i = 0; i < n; ++i) {
         for (int j = 0; j < n - i; ++j) {
           for (int k = 0; k < n - i - j; ++k, ++samples) {
             const double a = (i + 0.25) / n, b = (j + 0.25) / n, c = (k + 0.25) / n;
-            const double hu = sample_linear(ct, at[0] * a + at[1] * b + at[2] * c + at[3] * (1 - a - b - c));
+            const Vec3 place = at[0] * a + at[1] * b + at[2] * c + at[3] * (1 - a - b - c);
+            bool in = true;
+            for (std::size_t x = 0; x < 3; ++x) in = in && place[x] >= -1 && place[x] <= ct.frame.dims[x];
+            beyond += in ? 0 : 1;
+            const double hu = sample_linear(ct, place);
             const double where = hu + 32768, low = std::floor(where);
             const auto v = static_cast<std::size_t>(low);
             sum += law[v] + (where - low) * (law[std::min(v + 1, law.size() - 1)] - law[v]);
@@ -97,23 +103,26 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
       s.young_mpa[t] = sum / samples;
       s.hu[t] = static_cast<float>(sum_hu / samples);
       grams[t] = sum_density / samples * volume[t] / 1000;
+      outside[t] = volume[t] * beyond / samples;
     }
   });
-  if (const auto n = std::count(outside.begin(), outside.end(), 1); n > 0)
-    throw Error(ExitCode::usage, std::to_string(n) + " of " + std::to_string(count) + " tetrahedra lie outside of the CT",
-                "the CT is the one that the mesh was made from, before it was cropped; 'osteo info' prints where each is");
   double below = 0, above = 0;
   for (std::size_t t = 0; t < count; ++t) {
     s.volume_mm3 += volume[t];
     s.mass_g += grams[t];
+    s.share_outside += outside[t];
     below += s.young_mpa[t] < density.least_mpa ? volume[t] : 0;
     above += s.young_mpa[t] > density.most_mpa ? volume[t] : 0;
     s.young_mpa[t] = std::clamp(s.young_mpa[t], density.least_mpa, density.most_mpa);
   }
   if (s.volume_mm3 > 0) {
+    s.share_outside /= s.volume_mm3;
     s.share_below = below / s.volume_mm3;
     s.share_above = above / s.volume_mm3;
   }
+  if (s.share_outside > kMostOutside)
+    throw Error(ExitCode::usage, format_number(std::round(1000 * s.share_outside) / 10) + " % of the mesh lies outside of the CT",
+                "the CT is the one that the mesh was made from, before it was cropped; 'osteo info' prints where each is");
   struct Group {
     double volume = 0, sum = 0;
   };

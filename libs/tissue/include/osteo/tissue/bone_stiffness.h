@@ -48,6 +48,7 @@ struct BoneStiffness {
   std::size_t materials = 0;  ///< different moduli
   /// Share of the volume whose law gave less or more than the limits.
   double share_below = 0, share_above = 0;
+  double share_outside = 0;  ///< of the volume: more than half a voxel outside of the CT, where the values at its border were taken
 };
 
 /// The mean over each tetrahedron of the modulus at its places (not the modulus of the mean HU: F. Taddei et al., Med. Eng. Phys. 29,
