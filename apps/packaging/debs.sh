@@ -22,6 +22,9 @@ make() { # FOLDER cmake-options...
   cp "$build"/*.deb "$out"
 }
 mkdir -p "$root/build"
+# Two at once in one tree would take each other's half-made packages away.
+exec 9>"$root/build/.debs.lock"
+flock -n 9 || { echo "debs.sh is at work in this tree already" >&2; exit 1; }
 make deb-free -DOSTEO_CGAL=OFF -DOSTEO_TETGEN=OFF -DOSTEO_CERES=OFF -DOSTEO_MOVIE=OFF
 [ "${2:-}" = --free-only ] || make deb-full -DOSTEO_WINDOW=OFF -DOSTEO_PYTHON=OFF
 ls -l "$out"/*.deb
