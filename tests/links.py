@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What makes force and writes sessions is linked without DICOM and VTK: read from the commands that link the tests."""
+"""What makes force and writes sessions is linked without DICOM and VTK; what reads cameras (and loads codecs under the GPL) is in no program:
+read from the commands that link."""
 import re, subprocess, sys
 
 build = sys.argv[1]
@@ -19,5 +20,12 @@ seen = linked(witness)
 for name in ("dcmdata", "vtkDICOM", "osteo_io"):
     if not any(s.startswith(name) for s in seen):
         bad.append(f"{witness} links no {name}: are the names still right? It links {' '.join(seen)}")
+cameras = re.compile(r"opencv_(?:imgcodecs|videoio|highgui)\b")
+for p in ("bin/osteo", "bin/osteo-rehearse"):
+    commands = subprocess.run(["ninja", "-C", build, "-t", "commands", "-s", p], capture_output=True, text=True).stdout
+    if found := sorted(set(cameras.findall(commands.splitlines()[-1] if commands else ""))):
+        bad.append(f"{p} links {' '.join(found)}, which belong into osteo-camera.so alone")
+if not cameras.search(subprocess.run(["ninja", "-C", build, "-t", "commands", "-s", "lib/osteo/osteo-camera.so"], check=True, capture_output=True, text=True).stdout):
+    bad.append("osteo-camera.so links no part of OpenCV for cameras: are the names still right?")
 print("\n".join(bad) or f"{' '.join(programs)}: without DICOM and VTK")
 sys.exit(bool(bad))

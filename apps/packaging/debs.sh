@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the Debian packages: osteo, osteo-rehearse, libosteo-dev and python3-osteo without copyleft options, osteo-full with them.
+# Makes the Debian packages: osteo, osteo-rehearse, osteo-camera, libosteo-dev and python3-osteo without copyleft options, osteo-full with them.
 # usage: apps/packaging/debs.sh OUT [--free-only]      builds in build/deb-free and build/deb-full
 set -euo pipefail
 umask 022 # what is made while packing is for all to read

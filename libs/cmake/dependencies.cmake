@@ -25,5 +25,5 @@ find_path(OPENVDB_CMAKE_DIR FindOpenVDB.cmake PATH_SUFFIXES cmake/OpenVDB lib/cm
   lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB PATHS /usr /usr/local REQUIRED)
 list(APPEND CMAKE_MODULE_PATH ${OPENVDB_CMAKE_DIR})
 find_package(OpenVDB REQUIRED)
-find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc photo video calib3d aruco imgcodecs videoio)
+find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc photo video calib3d aruco)
 find_library(EGL_LIBRARY EGL REQUIRED)

@@ -2,7 +2,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# Components are what packages are made of (package.cmake): server, window, dev.
+# Components are what packages are made of (package.cmake): server, window, camera, dev.
 if(OSTEO_PROGRAMS)
   install(TARGETS osteo RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT server)
   if(OSTEO_WINDOW)
@@ -43,6 +43,7 @@ endforeach()
 if(OSTEO_LIBRARY_KIND STREQUAL SHARED AND TARGET osteo_window)
   install(TARGETS osteo_window LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/osteo COMPONENT window NAMELINK_SKIP)
 endif()
+install(TARGETS osteo_camera_module LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/osteo COMPONENT camera)
 foreach(name ${OSTEO_COMPONENT_NAMES})
   set_target_properties(osteo_${name} PROPERTIES EXPORT_NAME ${name})
   install(TARGETS osteo_${name} EXPORT osteoTargets COMPONENT dev)

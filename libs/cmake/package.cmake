@@ -1,12 +1,12 @@
-# Debian packages by CPack; apps/packaging/debs.sh makes them all. A tree without copyleft options makes osteo, osteo-rehearse, libosteo-dev and
-# python3-osteo; one with them makes osteo-full, which stands in for osteo.
+# Debian packages by CPack; apps/packaging/debs.sh makes them all. A tree without copyleft options makes osteo, osteo-rehearse, osteo-camera,
+# libosteo-dev and python3-osteo; one with them makes osteo-full, which stands in for osteo.
 set(OSTEO_PACKAGER "Osteotome developers <osteotome@example.org>" CACHE STRING "Who made the packages: name and address; set it before giving them away")
 if(OSTEO_CGAL OR OSTEO_TETGEN OR OSTEO_CERES OR OSTEO_MOVIE)
   set(OSTEO_DEB_SERVER osteo-full)
   set(deb_components server)
 else()
   set(OSTEO_DEB_SERVER osteo)
-  set(deb_components server dev)
+  set(deb_components server dev camera)
   if(OSTEO_WINDOW)
     list(APPEND deb_components window)
   endif()
@@ -17,6 +17,7 @@ endif()
 set(deb_name_server ${OSTEO_DEB_SERVER})
 set(deb_name_window osteo-rehearse)
 set(deb_name_dev libosteo-dev)
+set(deb_name_camera osteo-camera)
 set(deb_name_python python3-osteo)
 
 # The day of the commit, so that two builds of one commit give the same bytes.
@@ -84,6 +85,9 @@ if(window IN_LIST deb_components)
   osteo_sbom(window osteo-rehearse "osteo-rehearse;osteo-edit;osteo-console;osteo-experiment" OSTEO_WINDOW)
 endif()
 
+if(camera IN_LIST deb_components)
+  osteo_sbom(camera osteo-camera osteo_camera_module "")
+endif()
 if(python IN_LIST deb_components)
   osteo_sbom(python python3-osteo osteo_python OSTEO_PYTHON)
 endif()
@@ -108,11 +112,15 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_NAME ${OSTEO_DEB_SERVER})
 set(CPACK_DEBIAN_SERVER_PACKAGE_SECTION science)
 # Pictures are drawn by EGL in memory, pages are set in these letters.
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "libegl1, libgl1-mesa-dri, fonts-liberation, fonts-dejavu-core")
-set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS "osteo-rehearse, snakemake")
+set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS "osteo-rehearse, osteo-camera, snakemake")
 set(CPACK_DEBIAN_WINDOW_PACKAGE_NAME osteo-rehearse)
 set(CPACK_DEBIAN_WINDOW_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_WINDOW_PACKAGE_DEPENDS "osteo (= ${OSTEO_DEB_VERSION}) | osteo-full (= ${OSTEO_DEB_VERSION}), libegl1, libgl1-mesa-dri, fonts-dejavu-core")
+set(CPACK_DEBIAN_WINDOW_PACKAGE_RECOMMENDS osteo-camera)
 set(CPACK_DEBIAN_WINDOW_PACKAGE_SUGGESTS zenity)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_NAME osteo-camera)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_ENHANCES "osteo, osteo-full, osteo-rehearse")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libosteo-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
@@ -156,6 +164,9 @@ endif()
 set(CPACK_COMPONENT_WINDOW_DESCRIPTION "window for rehearsal of bone surgery
 Drills a prepared case by mouse, pen or haptic device, shows cuts, structures at risk and force, and records every tick.
 Also the window that corrects cases, the nerve monitor's console and the force-skill experiment. Not a medical device.")
+set(CPACK_COMPONENT_CAMERA_DESCRIPTION "cameras and videos for Osteotome's printed pen
+Reads the camera, the video or the folder of pictures that shows the printed markers. A package of its own because Debian's OpenCV brings
+along codecs under the GPL for it; nothing else in Osteotome loads them.")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "libraries of Osteotome, for other programs
 Static libraries, headers and osteoConfig.cmake: find_package(osteo COMPONENTS io mesh).
 Built without the copyleft options.")

@@ -49,6 +49,14 @@ for program in osteo-rehearse osteo-edit osteo-console osteo-experiment; do
   inside $program --version | grep -q osteo || { echo "$program does not start"; exit 1; }
 done
 [ -s "$work/root/usr/share/applications/osteo.desktop" ] || { echo "no desktop entry"; exit 1; }
+# Without osteo-camera no codec is loaded, and who wants a camera is told what to install.
+! inside ldd /usr/bin/osteo | grep -E 'libgdal|libavcodec|libx26|libpoppler' || { echo "osteo loads codecs"; exit 1; }
+as_user "osteo markers 1.png --page 1 --quiet && mkdir -p pages && mv 1.png pages"
+as_user "osteo calibrate-camera pages" >"$work/said" 2>&1 && { echo "a camera calibrated by one picture"; exit 1; }
+grep -q 'install the package osteo-camera' "$work/said" || { cat "$work/said"; exit 1; }
+install $(deb osteo-camera)
+as_user "osteo calibrate-camera pages" >"$work/said" 2>&1 && { echo "a camera calibrated by one picture"; exit 1; }
+grep -q '10 are needed' "$work/said" || { cat "$work/said"; exit 1; }
 if [ -n "$(deb python3-osteo)" ]; then
   install $(deb python3-osteo)
   # Computes by itself, opens what the program made, and draws without a display.

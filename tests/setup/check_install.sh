@@ -13,6 +13,10 @@ for f in bin/osteo share/osteo/pipelines/temporal-bone.json share/man/man1/osteo
   [ -s "$p/$f" ] || { echo "not installed: $f"; exit 1; }
 done
 "$p/bin/osteo" --version >/dev/null
+# What reads cameras is found where it was installed: a folder without a picture is told from a program without eyes.
+mkdir "$work/no-pictures"
+! "$p/bin/osteo" calibrate-camera "$work/no-pictures" 2>"$work/said" || { echo "an empty folder calibrates a camera"; exit 1; }
+grep -q "holds no picture" "$work/said" || { cat "$work/said"; exit 1; }
 # Slicer starts a module alone, from anywhere: XML on standard output and nothing beside it.
 (cd / && "$p/share/osteo/slicer/OsteoThreshold" --xml >"$work/t.xml" 2>"$work/t.err") && [ ! -s "$work/t.err" ] && head -c 5 "$work/t.xml" | grep -q '<?xml' && cmp "$work/t.xml" "$p/share/osteo/slicer/OsteoThreshold.xml"
 bash -n "$p/share/bash-completion/completions/osteo"
