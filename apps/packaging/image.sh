@@ -21,6 +21,8 @@ if ! timeout 60 buildah "${storage[@]}" pull -q "$base" >/dev/null 2>"$work/pull
   rm "$work/base.tar"
   base=localhost/osteo-base
 fi
-b bud -q --isolation chroot --layers=false --target "$target" --build-arg BASE="$base" -t "localhost/osteo:$target" -f "$root/apps/packaging/Containerfile" "$debs" >/dev/null
+mkdir "$work/context"
+cp "$debs"/osteo_*.deb "$debs"/osteo-full_*.deb "$root/apps/packaging/closure.sh" "$work/context" 2>/dev/null || [ -s "$work/context/closure.sh" ]
+b bud -q --isolation chroot --layers=false --target "$target" --build-arg BASE="$base" -t "localhost/osteo:$target" -f "$root/apps/packaging/Containerfile" "$work/context" >/dev/null
 b push -q "localhost/osteo:$target" "docker-archive:$out:osteo:$target"
 echo "$out: $(($(stat -c %s "$out") / 1000000)) MB"

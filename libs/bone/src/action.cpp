@@ -36,6 +36,9 @@ constexpr ActionValue kSetting[] = {{"value", "as the setting's"}};
 constexpr ActionValue kGuide[] = {{"hand", "1"}, {"stiffness", "N/mm"}, {"damping", "N s/m"}, {"forward", "1"},
                                   {"most", "N"}, {"dead_zone", "mm"},   {"own_contact", "1"}, {"brake", "N s/m"}};
 
+constexpr ActionValue kCuttingGuide[] = {{"at_x", "mm"},    {"at_y", "mm"},    {"at_z", "mm"},  {"normal_x", "1"},
+                                         {"normal_y", "1"}, {"normal_z", "1"}, {"within", "mm"}};
+
 constexpr auto kLast = static_cast<std::size_t>(ActionKind::behind_last) - 1;
 constexpr std::array<ActionRow, kLast> kTable{{
     {.kind = ActionKind::hold, .name = "hold", .help = "nothing is removed from here on"},
@@ -151,6 +154,13 @@ constexpr std::array<ActionRow, kLast> kTable{{
      .help = "one hand is led by another from here on: by a spring, a damper and the force that the other feels",
      .item = "which hand leads",
      .values = kGuide},
+    {.kind = ActionKind::cutting_guide,
+     .name = "cutting_guide",
+     .help = "a slot that holds the hand's saw in a plane, until the next of these; within 0: none",
+     .changes_touch = true,
+     .last_counts = true,
+     .hand = "whose saw",
+     .values = kCuttingGuide},
 }};
 
 // A kind without its row, or out of order, does not compile.
@@ -264,6 +274,21 @@ SceneAction SceneAction::setting(std::uint32_t number, double value) {
   a.item = number;
   a.values[0] = value;
   return a;
+}
+
+SceneAction SceneAction::cutting_guide(const CuttingGuide& guide, std::uint32_t hand) {
+  SceneAction a = plain(ActionKind::cutting_guide);
+  put(a.values, 0, guide.at_mm);
+  put(a.values, 3, guide.normal);
+  a.values[6] = guide.within_mm;
+  a.hand = hand;
+  return a;
+}
+
+CuttingGuide SceneAction::guide() const {
+  const Vec3 normal = vector_at(values, 3);
+  if (!(length(normal) > 1e-9)) return {};
+  return {vector_at(values, 0), normalized(normal), values[6]};
 }
 
 RigidTransform SceneAction::transform() const {

@@ -21,13 +21,14 @@ float efficiency_at(double falloff_per_rad, double sine_of_latitude) {
 }  // namespace
 
 std::string Burr::name() const {
+  if (length_mm > 0) return "saw " + format_number(length_mm) + " mm";
   const std::string form = shape == BurrShape::ball ? "" : std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(shape)]) + " ";
   return std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]) + " " + form + format_number(diameter_mm) + " mm";
 }
 
 RoundCone Burr::head() const {
   const double r = diameter_mm / 2;
-  if (shape == BurrShape::cylinder) return {0, 1.5 * diameter_mm, r, r};
+  if (shape == BurrShape::cylinder) return {0, length_mm > 0 ? length_mm : 1.5 * diameter_mm, r, r};
   if (shape == BurrShape::taper) return {0, 2 * diameter_mm, r / 2, r};
   return {0, 0, r, r};
 }

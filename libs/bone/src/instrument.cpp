@@ -7,7 +7,18 @@
 namespace osteo {
 namespace {
 
-constexpr double kMmPerFrench = 1.0 / 3, kTubeLengthMm = 60;
+constexpr double kMmPerFrench = 1.0 / 3, kTubeLengthMm = 60, kBladeMm = 1;
+
+Instrument cutting(InstrumentKind kind, std::string name, const Burr& edge) {
+  Instrument i;
+  i.kind = kind;
+  i.name = std::move(name);
+  i.head = edge.head();
+  i.shaft = edge.shaft();
+  i.edge = edge;
+  i.falloff_per_rad = edge.falloff_mm3_per_s_per_n_per_rad / edge.rate_mm3_per_s_per_n;
+  return i;
+}
 
 // A tube or rod that ends in a ball; thinner behind it where `rod_mm` says so.
 Instrument rod(InstrumentKind kind, std::string name, double diameter_mm, double rod_mm) {
@@ -33,15 +44,7 @@ std::vector<CutDepth> cut_depths(ShapeOf shape_of) {
 const std::vector<Instrument>& instrument_library() {
   static const std::vector<Instrument> library = [] {
     std::vector<Instrument> all;
-    for (const Burr& b : burr_library()) {
-      Instrument i;
-      i.name = b.name();
-      i.head = b.head();
-      i.shaft = b.shaft();
-      i.burr = static_cast<int>(all.size());
-      i.falloff_per_rad = b.falloff_mm3_per_s_per_n_per_rad / b.rate_mm3_per_s_per_n;
-      all.push_back(std::move(i));
-    }
+    for (const Burr& b : burr_library()) all.push_back(cutting(InstrumentKind::burr, b.name(), b));
     for (const int french : {5, 7, 8, 10, 12}) {
       const double outer_mm = french * kMmPerFrench, size = french / 10.0;
       Instrument i = rod(InstrumentKind::sucker, "sucker " + std::to_string(french) + " Fr", outer_mm, outer_mm);
@@ -55,6 +58,13 @@ const std::vector<Instrument>& instrument_library() {
     all.push_back(std::move(water));
     all.push_back(rod(InstrumentKind::probe, "probe 1 mm", 1, 0.7));
     all.push_back(rod(InstrumentKind::probe, "hook 2 mm", 2, 1));
+    Burr teeth{BurrKind::cutting, kBladeMm, 3, 1.35, BurrShape::cylinder};
+    teeth.length_mm = 25;
+    Instrument saw = cutting(InstrumentKind::saw, "saw 25 mm", teeth);
+    saw.shaft.start_radius_mm = saw.shaft.end_radius_mm = 1.5 * kBladeMm;  // the chuck, which does not follow into the cut
+    saw.shaft.start_mm = saw.head.length_mm + saw.head.end_radius_mm + saw.shaft.start_radius_mm;
+    saw.speed_share = 0.25;
+    all.push_back(std::move(saw));
     return all;
   }();
   return library;
@@ -66,7 +76,7 @@ int instrument_index(std::string_view name) {
   if (it != all.end()) return static_cast<int>(it - all.begin());
   std::string names;
   for (const Instrument& i : all) {
-    if (i.burr < 0) names += ", " + i.name;
+    if (i.kind != InstrumentKind::burr) names += ", " + i.name;
   }
   throw Error(ExitCode::usage, "there is no instrument '" + std::string(name) + "'", "burrs as in 'cutting 4 mm'" + names);
 }

@@ -259,6 +259,13 @@ World::Effect World::act(const SceneAction& a, const ComponentsOf& components) {
             a.values[7] <= 100))
         return nothing("a guide pulls with -10 to 10 N/mm, 0 to 100 N s/m, up to 20 N and twice the leader's force");
       break;
+    case ActionKind::cutting_guide:
+      if (!(a.values[6] >= 0 && a.values[6] <= SceneAction::kMostSlotMm))
+        return nothing("a saw slips into a cutting guide from 0 to " + format_number(SceneAction::kMostSlotMm) + " mm away");
+      if (a.values[6] > 0 && !(length(Vec3{a.values[3], a.values[4], a.values[5]}) > 1e-9))
+        return nothing("the plane of a cutting guide has no direction across it");
+      guides_[a.hand] = a.guide();
+      break;
     case ActionKind::saw:
       return saw(a);
     case ActionKind::split:

@@ -85,7 +85,7 @@ void HintWatch::action(const SceneAction& action) {
 }
 
 bool HintWatch::holds(const HintRule& rule, const TickRecord& t) const {
-  const Burr* const burr = instrument_of(t.device.tool).as_burr();
+  const Burr* const burr = instrument_of(t.device.tool).cutter();
   if (is_near(rule.kind) && (t.structure == 0 || static_cast<double>(t.clearance_mm) > rule.within_mm)) return false;
   switch (rule.kind) {
     case HintKind::unseen:
@@ -108,7 +108,7 @@ void HintWatch::tick(const TickRecord& t) {
     return;
   }
   last_ = t;
-  drilling_ = instrument_of(t.device.tool).as_burr() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
+  drilling_ = instrument_of(t.device.tool).cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
   const auto pause = static_cast<std::uint64_t>(kPauseS * rate_hz_);
   for (std::size_t n = 0; n < rules_.size(); ++n) {
     Watched& w = rules_[n];

@@ -6,6 +6,7 @@
 
 #include "osteo/bone/instrument.h"
 #include "osteo/evidence/visibility.h"
+#include "osteo/haptics/saw_slot.h"
 #include "osteo/statistics/basics.h"
 
 namespace osteo {
@@ -18,7 +19,7 @@ constexpr const char* kNearMm3[] = {"near_05_mm3", "near_1_mm3", "near_mm3", "ne
 static_assert(std::size(kNearS) == NearMetric::kBandsMm.size() && NearMetric::kBandsMm[2] == kNearMm);
 
 bool drills(const TickRecord& t, const Instrument& tool) {
-  return tool.as_burr() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
+  return tool.cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0;
 }
 double seconds(std::uint64_t ticks, double rate_hz) {
   return static_cast<double>(ticks) / rate_hz;
@@ -211,10 +212,10 @@ void NearMetric::frame(const EvidenceFrame& f) {
     const std::optional<Vec3> last_at = std::exchange(last_at_[hand], device_at);
     const Instrument& tool = instrument_of(t.device.tool);
     if ((t.flags & kPlateInHand) != 0) continue;
-    const bool turns = tool.as_burr() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm;
-    if (!turns && (t.flags & kStructureTouched) == 0 && tool.as_burr() == nullptr) continue;
+    const bool turns = tool.cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm;
+    if (!turns && (t.flags & kStructureTouched) == 0 && tool.cutter() == nullptr) continue;
     const Vec3 at = own(device_at + from_floats(t.shown_offset_mm));
-    scene_.structures->clearance(tool.head, at, own.rotation * normalized(from_floats(t.device.axis)), each_);
+    scene_.structures->clearance(tool.head, at, own.rotation * tool_axis(t, f.world.cutting_guide(t.hand)), each_);
     const bool works = drills(t, tool), removes = t.removed_mm3 > 0;
     const double t_s = seconds(t.tick, f.rate_hz), force = static_cast<double>(t.normal_force_n);
     if (works && t.hand == 0 && steps_) steps_->drill(known_ - 1, each_);
@@ -233,7 +234,9 @@ void NearMetric::frame(const EvidenceFrame& f) {
       }
       if (injures) {
         ++o.injured;
-        if (!o.injured_before) moments_.push_back({t_s, at, "reached by a turning burr", scene_.structures->name_of(names[s]), d, 0});
+        if (!o.injured_before)
+          moments_.push_back({t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a turning burr",
+                              scene_.structures->name_of(names[s]), d, 0});
       }
       o.injured_before = injures;
       for (std::size_t b = 0; b < kBandsMm.size(); ++b) {
@@ -252,7 +255,7 @@ void NearMetric::frame(const EvidenceFrame& f) {
       for (std::size_t s = 0; s < of_.size(); ++s) {
         if (each_[s] >= r.within_mm || scene_.structures->name_of(names[s]) != r.structure) continue;
         ruled = true;
-        const Burr& burr = *tool.as_burr();
+        const Burr& burr = *tool.cutter();
         allowed = allowed && burr.diameter_mm <= r.most_diameter_mm + 1e-9 && !(r.diamond_only && burr.kind == BurrKind::cutting);
       }
     }

@@ -7,6 +7,7 @@
 #include "osteo/bone/instrument.h"
 #include "osteo/evidence/frames.h"
 #include "osteo/evidence/process.h"
+#include "osteo/haptics/saw_slot.h"
 
 namespace osteo {
 namespace {
@@ -83,11 +84,11 @@ std::size_t TimelineKeeper::add(TimelineEvent event) {
 void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size_t sample) {
   if (scene_.structures == nullptr || (t.flags & kPlateInHand) != 0) return;
   const Instrument& tool = instrument_of(t.device.tool);
-  if (tool.as_burr() == nullptr) return;
+  if (tool.cutter() == nullptr) return;
   const RigidTransform own = f.world.bodies().front().world_from_body.inverse();
   const Vec3 at = own(from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm));
-  scene_.structures->clearance(tool.head, at, own.rotation * normalized(from_floats(t.device.axis)), each_);
-  const bool turns = static_cast<double>(t.speed_rpm) > kTurnsRpm;
+  scene_.structures->clearance(tool.head, at, own.rotation * tool_axis(t, f.world.cutting_guide(t.hand)), each_);
+  const bool turns = static_cast<double>(t.speed_rpm) > kTurnsRpm, saw = tool.kind == InstrumentKind::saw;
   const double t_s = second_of(t.tick, f.rate_hz);
   for (std::size_t s = 0; s < each_.size(); ++s) {
     if (watched_[s] == 0) continue;
@@ -104,7 +105,9 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
     } else {
       const std::string name = scene_.structures->name_of(value);
       now.event = add({turns ? EventKind::injury : EventKind::touch, t_s, t_s,
-                       turns ? "a turning burr reached the " + name : "the burr, at rest, touched the " + name, name, true, at});
+                       turns ? (saw ? "the running saw reached the " : "a turning burr reached the ") + name
+                             : (saw ? "the saw, at rest, touched the " : "the burr, at rest, touched the ") + name,
+                       name, true, at});
     }
     now.on = true;
     now.last_tick = t.tick;
@@ -152,7 +155,7 @@ void TimelineKeeper::frame(const EvidenceFrame& f) {
     line_.known[n] = 1;
     const Instrument& tool = instrument_of(t.device.tool);
     line_.removed_mm3[n] += t.removed_mm3;
-    if (tool.as_burr() != nullptr) {
+    if (tool.cutter() != nullptr) {
       line_.force_n[n] = std::max(line_.force_n[n], t.normal_force_n);
       if (static_cast<double>(t.speed_rpm) > kTurnsRpm && t.normal_force_n > 0) line_.drilling[n] = 1;
     }

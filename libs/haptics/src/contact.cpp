@@ -35,8 +35,9 @@ std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
   const RoundCone head = burr.head();
   const double voxels = std::min(head.start_radius_mm, head.end_radius_mm) / spacing_mm;
   if (voxels >= kLeastRadiusVoxels) return {};
-  return "the " + burr.name() + " burr is small for voxels of " + format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " +
-         format_number(std::round(voxels * 10) / 10) + " voxels): force and its direction are coarse; from " +
+  return "the " + burr.name() + (burr.length_mm > 0 ? " is small for" : " burr is small for") + " voxels of " +
+         format_number(std::round(spacing_mm * 1000) / 1000) + " mm (radius " + format_number(std::round(voxels * 10) / 10) +
+         " voxels): force and its direction are coarse; from " +
          format_number(std::floor(spacing_mm * voxels / kLeastRadiusVoxels * 100 + 1e-6) / 100) +
          " mm they are true: prepare with a smaller --spacing, or a finer region of interest where it drills";
 }

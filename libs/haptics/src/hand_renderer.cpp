@@ -101,21 +101,22 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
     elastic += soft_.normal * push;
     if (push > 0) flags_ |= kSoftContact;
   }
+  if ((flags_ & kInSlot) != 0) elastic += slot_.force_n(law_.stiffness_n_per_mm, law_.max_force_n);
   Vec3 driven = effects();
   if (led && usable_) {
-    const Vec3 pull = guide_.step(at_, before, leader_, leader_force_n_, common_.dt_s);
+    const Vec3 pull = guide_.step(hand_at_, before, leader_, leader_force_n_, common_.dt_s);
     driven += pull;
     if (!(pull == Vec3{})) flags_ |= kGuided;
   }
   if (constraint_ && usable_) {
-    const auto held = constraint_->update(at_);
+    const auto held = constraint_->update(hand_at_);
     if (held.engaged) {
       elastic += held.force_n;
       flags_ |= kCurveHeld;
     }
   }
 
-  in.position_mm = at_;
+  in.position_mm = hand_at_;
   in.elastic_n = elastic;
   in.normal = contact_.normal == Vec3{} ? normalized(elastic) : contact_.normal;
   in.effects_n = driven;
@@ -153,14 +154,16 @@ void HandRenderer::place(const DeviceSample& sample, Guard::Input& in) noexcept 
     last_good_ = pose_;
     has_last_ = true;
   }
-  at_ = position_of(pose_);
+  hand_at_ = at_ = position_of(pose_);
   axis_ = axis_of(pose_);
+  const bool saw = usable_ && plate() == nullptr && instrument_->kind == InstrumentKind::saw;
+  if (slot_.step(common_.scene->guides[number_], saw, at_, axis_, common_.dt_s)) flags_ |= kInSlot;
 }
 
 void HandRenderer::spin(std::uint8_t pedal) noexcept {
   if (pose_.tool != last_tool_) speed_rpm_ = 0;
   last_tool_ = pose_.tool;
-  const double wanted = instrument_->burr >= 0 ? common_.params.effects.speed_rpm * pedal / 255 : 0;
+  const double wanted = instrument_->cutter() != nullptr ? common_.params.effects.speed_rpm * pedal / 255 : 0;
   speed_rpm_ += (wanted - speed_rpm_) * (wanted > speed_rpm_ ? common_.up_share : common_.down_share);
   if (std::abs(wanted - speed_rpm_) < kThereRpm) speed_rpm_ = wanted;
 }
@@ -290,16 +293,19 @@ void HandRenderer::shaft(Vec3& elastic, Vec3& torque) noexcept {
 
 // Of a burr that turns; of all else what it slides over.
 Vec3 HandRenderer::effects() noexcept {
-  const Burr* const burr = instrument_->as_burr();
-  const bool turns = pose_.pedal != 0 && burr != nullptr;
+  const Burr* const edge = instrument_->cutter();
+  const bool turns = pose_.pedal != 0 && edge != nullptr;
   Vec3 shaken{};
   if (texture_ && usable_) shaken = texture_->step(at_, contact_.normal, turns || plate() ? 0 : contact_.normal_force_n);
   if (!turns) return shaken;
   const EffectParams& with = common_.params.effects;
   const double speed = speed_rpm_ / Burr::kNominalRpm, turn = with.left_handed ? -1 : 1;
-  Vec3 driven = cross(contact_.normal, axis_) * (turn * std::min(1.0, speed) * with.drag * contact_.normal_force_n);
+  // Teeth that go to and fro drag neither way.
+  Vec3 driven;
+  if (instrument_->kind == InstrumentKind::burr)
+    driven = cross(contact_.normal, axis_) * (turn * std::min(1.0, speed) * with.drag * contact_.normal_force_n);
   if (with.vibration) {
-    const auto v = vibration_.step(burr->kind, contact_.normal_force_n, common_.dt_s, speed);
+    const auto v = vibration_.step(edge->kind, contact_.normal_force_n, common_.dt_s, speed * instrument_->speed_share);
     const Vec3 u = any_perpendicular(axis_);
     driven += u * v[0] + cross(axis_, u) * v[1];
   }
@@ -318,8 +324,8 @@ double HandRenderer::thickness() const noexcept {
 }
 
 void HandRenderer::remove(std::size_t& count) noexcept {
-  const Burr* const burr = instrument_->as_burr();
-  if (!cuts_ || burr == nullptr) return;
+  const Burr* const edge = instrument_->cutter();
+  if (!cuts_ || edge == nullptr) return;
   double removed_mm3 = 0;
   const std::size_t first_change = count;
   for (std::size_t i = 0; i < touched_count_; ++i) {
@@ -328,7 +334,7 @@ void HandRenderer::remove(std::size_t& count) noexcept {
     // What presses into this body: its share of what the burr is in.
     const double share = contact_.bone_mm3 > 0 ? t.contact.bone_mm3 / contact_.bone_mm3 : 1;
     double removed = 0;
-    const auto changes = bone.removal().remove(bone.bone(), t.model->cut(bone.bone()), *burr,
+    const auto changes = bone.removal().remove(bone.bone(), t.model->cut(bone.bone()), *edge,
                                                touched_count_ == 1 ? contact_.normal_force_n : share * contact_.normal_force_n, speed_rpm_,
                                                common_.dt_s, bone.hardness(), removed, number_);
     removed_mm3 += removed;
@@ -342,7 +348,7 @@ void HandRenderer::remove(std::size_t& count) noexcept {
 }
 
 const TickRecord& HandRenderer::finish() noexcept {
-  record_.shown_offset_mm = to_floats(contact_.shown_offset_mm);
+  record_.shown_offset_mm = to_floats(contact_.shown_offset_mm + (at_ - hand_at_));
   record_.normal_force_n = static_cast<float>(contact_.normal_force_n);
   record_.depth_mm = static_cast<float>(contact_.depth_mm);
   record_.immersed = contact_.immersed;

@@ -3,6 +3,7 @@
 #include "contact_models.h"
 #include "osteo/haptics/guide.h"
 #include "osteo/haptics/renderer.h"
+#include "osteo/haptics/saw_slot.h"
 #include "osteo/haptics/texture.h"
 
 namespace osteo {
@@ -80,6 +81,7 @@ class HandRenderer {
     double force_n = 0, stiffness_n_per_mm = 0;
   } soft_;
   GuideLaw guide_;
+  SawSlot slot_;
   DeviceSample leader_;
   Vec3 leader_force_n_;
   bool leads_ = false, resting_ = false;
@@ -91,7 +93,8 @@ class HandRenderer {
   // Of this tick.
   DeviceSample pose_;
   const Instrument* instrument_ = nullptr;
-  Vec3 at_, axis_;
+  Vec3 hand_at_;    // where the hand has the tool
+  Vec3 at_, axis_;  // where the tool is: elsewhere in a cutting guide
   bool usable_ = false, cuts_ = false;
   std::uint32_t flags_ = 0;
   std::array<Touch, HapticRenderer::kMostTouched> touched_;

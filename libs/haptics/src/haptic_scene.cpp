@@ -145,6 +145,7 @@ HapticScene HapticScene::of(const World& world, const HapticSetup& setup, const 
     const World::Grip& grip = world.grip(hand);
     if (grip.plate != SceneAction::kNobody) scene.held[hand].plate = std::make_shared<const PlateInHand>(plate_library()[grip.plate]);
     scene.held[hand].grip = grip.hand_from_plate;
+    scene.guides[hand] = world.cutting_guide(hand);
   }
   make_room(scene, setup);
   return scene;

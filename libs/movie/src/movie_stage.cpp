@@ -35,7 +35,7 @@ Picture MovieStage::draw(SessionScene& scene, const ScopeView& view, std::size_t
   const auto solid = [&](Vec3 p) { return is_bone(*scene.world(), p); };
   for (std::size_t h = 0; h < hands_.size(); ++h) {
     if (h < hands && scene.in_use(h)) {
-      hands_[h]->show(scene.latest(h), rate_hz, solid);
+      hands_[h]->show(scene.latest(h), rate_hz, solid, scene.world()->cutting_guide(static_cast<std::uint32_t>(h)));
     } else {
       hands_[h]->hide();
     }

@@ -130,10 +130,10 @@ void MonitorReader::tick(const TickRecord& record, std::span<const VoxelChange> 
   if (record.hand >= kMostHands) return;
   Hand& hand = hands_[record.hand];
   hand.seen = (record.flags & (kPlateInHand | kPoseInvalid)) == 0;
-  const bool burr = instrument_of(record.device.tool).as_burr() != nullptr;
-  const double press = burr ? static_cast<double>(record.normal_force_n) : length(from_floats(record.force_n));
+  const bool cutter = instrument_of(record.device.tool).cutter() != nullptr;
+  const double press = cutter ? static_cast<double>(record.normal_force_n) : length(from_floats(record.force_n));
   hand.press_n = std::max(hand.press_n, press);
-  hand.turns = burr && record.speed_rpm > 0;
+  hand.turns = cutter && record.speed_rpm > 0;
   hand.touches = hand.touches || press > 0 || record.immersed > 0;
   if (hand.seen) hand.last = record;
 }

@@ -367,9 +367,9 @@ RehearsalSummary Rehearsal::finish() {
   s.unusable_poses = readers_->tools.unusable_poses();
   if (loop_) s.loop = loop_->stats();
   for (const std::uint8_t tool : readers_->tools.burrs_used()) {
-    const Burr* const burr = instrument_of(tool).as_burr();
-    if (burr == nullptr) continue;
-    if (std::string text = too_small_for_voxels(*burr, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
+    const Burr* const edge = instrument_of(tool).cutter();
+    if (edge == nullptr) continue;
+    if (std::string text = too_small_for_voxels(*edge, finest_voxel_mm_); !text.empty()) s.warnings.push_back(std::move(text));
   }
   if (const std::uint64_t n = readers_->tools.ticks_without_room(); n > 0)
     s.warnings.push_back("in " + std::to_string(n) +

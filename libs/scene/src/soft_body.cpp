@@ -136,8 +136,8 @@ std::optional<SceneAction> SoftBody::update(const SoftTool& tool) {
   const double size = length(force);
   const bool pushes = size > 1e-4;
   const double met = std::max(1, m.dynamics.met_by_tool());
-  if (const Burr* const burr = held.as_burr(); burr != nullptr && tool.turns && pushes) {
-    if (m.cutting.cut(m.dynamics, *shape, VoxelCutting::rate_mm3_per_s(size, burr->rate_mm3_per_s_per_n) / kUpdatesPerS)) m.lay_surface();
+  if (const Burr* const edge = held.cutter(); edge != nullptr && tool.turns && pushes) {
+    if (m.cutting.cut(m.dynamics, *shape, VoxelCutting::rate_mm3_per_s(size, edge->rate_mm3_per_s_per_n) / kUpdatesPerS)) m.lay_surface();
   }
   if (!pushes && !m.pushed) return std::nullopt;
   m.pushed = pushes;

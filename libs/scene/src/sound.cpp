@@ -72,11 +72,11 @@ void SoundTracker::take(const TickRecord& record) noexcept {
   const bool plate = (record.flags & kPlateInHand) != 0;
   const double dt = 1 / rate_hz_, pedal = record.device.pedal / 255.0;
   voice = {};
-  const Burr* const burr = plate ? nullptr : instrument.as_burr();
-  if (burr != nullptr) {
-    voice.kind = burr->kind == BurrKind::cutting ? SoundKind::cutting : SoundKind::diamond;
-    voice.speed_rpm = record.speed_rpm;
-    voice.diameter_mm = burr->diameter_mm;
+  const Burr* const edge = plate ? nullptr : instrument.cutter();
+  if (edge != nullptr) {
+    voice.kind = edge->kind == BurrKind::cutting ? SoundKind::cutting : SoundKind::diamond;
+    voice.speed_rpm = record.speed_rpm * instrument.speed_share;  // a saw sounds at its strokes
+    voice.diameter_mm = edge->diameter_mm;
     voice.press_n = record.normal_force_n;
     if (record.normal_force_n > 0 && record.thickness_mm > 0) {
       thickness =

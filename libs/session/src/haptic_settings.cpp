@@ -52,7 +52,7 @@ void set_tool_methods(const JsonValue& tools, const JsonFile& file, HapticSetup&
     }
     if (!any)
       throw file.wrong(method_name, "tools: no instrument is a \"" + words + "\"",
-                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook");
+                       "words are cutting, diamond, ball, cylinder, taper, 1 mm to 7 mm, sucker, irrigator, probe, hook, saw");
   }
 }
 

@@ -32,12 +32,13 @@ Vec3 vec(const Triple& t) {
 
 struct Head {
   int version = 1;
-  std::string schema, about;
+  std::string schema, about, instrument;
   Triple axis{0, 0, 1};
   static void describe(Head& p, auto& visit) {
     visit({"osteotome_strokes", "version of the format", "", 1, 1, true}, p.version);
     visit({"$schema", "where its schema lies, for editors"}, p.schema);
     visit({"about", "what it shows"}, p.about);
+    visit({"instrument", "by name, in place of a burr, as saw 25 mm"}, p.instrument);
     visit({"axis", "from the burr to the handle, LPS", "", -kFarMm, kFarMm, true}, p.axis);
   }
 };
@@ -117,6 +118,19 @@ struct Saw {
     visit({"length_mm", "of the cut; 0: through", "mm", 0, 2000}, p.length_mm);
     visit({"depth_mm", "across normal and length; 0: through", "mm", 0, 2000}, p.depth_mm);
     visit({"piece", "only this one; -1: all", "", -1, kMostPieces}, p.piece);
+  }
+};
+
+struct GuidePart {
+  static constexpr const char *kName = "cutting_guide", *kHelp = "a slot that holds a hand's saw in a plane, until the next of these";
+  Triple at_mm{}, normal{};
+  double within_mm = 2;
+  int hand = 0;
+  static void describe(GuidePart& p, auto& visit) {
+    visit({"at_mm", "a point of the plane, LPS", "mm", -kFarMm, kFarMm, true}, p.at_mm);
+    visit({"normal", "across the plane", "", -kFarMm, kFarMm, true}, p.normal);
+    visit({"within_mm", "a saw this near slips in; 0: the guide is taken away", "mm", 0, SceneAction::kMostSlotMm}, p.within_mm);
+    visit({"hand", "whose saw", "", 0, kMostHands - 1}, p.hand);
   }
 };
 
@@ -231,7 +245,7 @@ struct Set {
   static void describe(Set& p, auto& visit) { HapticsParams::describe(p.params, visit); }
 };
 
-using Forms = std::tuple<Saw, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
+using Forms = std::tuple<Saw, GuidePart, SplitPart, Move, Grip, Attach, Detach, Open, Suction, Irrigate, Patient, Undo, Set>;
 
 template <class T>
 std::vector<FieldRef> fields_in(T& part) {
@@ -251,10 +265,16 @@ class ScriptReader {
     const std::vector<std::string> besides{"burr", "camera", "waypoints", "actions", "hands"};
     file_.read(root, "", fields_in(head), besides);
     script_.axis = direction(root, "", "axis", head.axis);
-    BurrPart burr;
-    const JsonValue& b = needed(root, "burr", JsonValue::Kind::object, "{\"kind\": \"cutting\", \"diameter_mm\": 4}");
-    file_.read(b, "burr", fields_in(burr));
-    script_.tool = located(b, "burr", [&] { return burr_index(burr.kind, burr.diameter_mm, burr.shape); });
+    if (const JsonValue* const i = root.find("instrument")) {
+      if (root.find("burr") != nullptr)
+        throw file_.wrong(*i, "the hand holds a \"burr\" or another \"instrument\"", "leave out one of the two");
+      script_.tool = located(*i, "instrument", [&] { return instrument_index(head.instrument); });
+    } else {
+      BurrPart burr;
+      const JsonValue& b = needed(root, "burr", JsonValue::Kind::object, "{\"kind\": \"cutting\", \"diameter_mm\": 4}");
+      file_.read(b, "burr", fields_in(burr));
+      script_.tool = located(b, "burr", [&] { return burr_index(burr.kind, burr.diameter_mm, burr.shape); });
+    }
     if (const JsonValue* const c = root.find("camera")) {
       CameraPart camera;
       file_.read(*c, "camera", fields_in(camera));
@@ -424,6 +444,10 @@ class ScriptReader {
     cut.along = vec(s.along);
     add(t, SceneAction::saw(cut, s.piece < 0 ? SceneAction::kNobody : static_cast<std::uint32_t>(s.piece)));
   }
+  void act(double t, const GuidePart& g, const JsonValue& j, const std::string& where) {
+    add(t, SceneAction::cutting_guide({vec(g.at_mm), direction(j, where, "normal", g.normal), g.within_mm},
+                                      static_cast<std::uint32_t>(g.hand)));
+  }
   void act(double t, const SplitPart& s, const JsonValue&, const std::string&) { add(t, SceneAction::split(s.least_mm3)); }
   // What a move leaves out stays as it was.
   void now_at(const JsonValue& j, const std::string& where, Move& m) {
@@ -526,12 +550,16 @@ Script load_script(const fs::path& path) {
 }
 
 std::string script_json(const Script& script) {
-  const Burr& burr = burr_library()[static_cast<std::size_t>(script.tool)];
+  const Instrument& held = instrument_of(static_cast<std::uint8_t>(script.tool));
   ordered_json j;
   j["osteotome_strokes"] = 1;
-  j["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(burr.kind)]},
-               {"diameter_mm", burr.diameter_mm},
-               {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(burr.shape)]}};
+  if (const Burr* const burr = held.as_burr()) {
+    j["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(burr->kind)]},
+                 {"diameter_mm", burr->diameter_mm},
+                 {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(burr->shape)]}};
+  } else {
+    j["instrument"] = held.name;
+  }
   j["axis"] = {script.axis.x, script.axis.y, script.axis.z};
   j["waypoints"] = ordered_json::array();
   for (const auto& w : script.waypoints) {
@@ -570,8 +598,8 @@ std::string script_schema() {
   };
   std::apply([&](auto... form) { (add(form), ...); }, Forms());
   s["properties"]["actions"] = {{"type", "array"}, {"items", {{"oneOf", any}}}};
-  s["required"].push_back("burr");
   s["required"].push_back("waypoints");
+  s["oneOf"] = {{{"required", {"burr"}}}, {{"required", {"instrument"}}}};
   root.update(s);
   return root.dump(2) + "\n";
 }

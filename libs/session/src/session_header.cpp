@@ -110,12 +110,13 @@ ordered_json instruments_json() {
                      {"kind", EnumNames<InstrumentKind>::values[static_cast<std::size_t>(i.kind)]},
                      {"head", shape(i.head)},
                      {"shaft", shape(i.shaft)}};
-    if (const Burr* const b = i.as_burr()) {
+    if (const Burr* const b = i.cutter()) {
       one["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(b->kind)]},
                      {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(b->shape)]},
                      {"diameter_mm", b->diameter_mm},
                      {"rate_mm3_per_s_per_n", b->rate_mm3_per_s_per_n},
                      {"falloff_mm3_per_s_per_n_per_rad", b->falloff_mm3_per_s_per_n_per_rad}};
+      if (i.kind == InstrumentKind::saw) one["speed_share"] = i.speed_share;
     } else if (i.rate > 0) {
       one["rate"] = i.rate;
       one["reach_mm"] = i.reach_mm;

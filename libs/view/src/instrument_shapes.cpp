@@ -119,6 +119,28 @@ double grain(int a, int r) {
   return (x & 0xffffU) / 65535.0;
 }
 
+// A flat blade, toothed at one edge: as thick as what is felt; as wide as blades are, which is not felt. Its flat lies across x; which way
+// it is turned about its own axis the hand does not tell.
+void blade(Rings& rings, const RoundCone& head) {
+  const double thick = head.start_radius_mm, end = head.length_mm + head.end_radius_mm;
+  constexpr Colour kTooth{0.86, 0.87, 0.88};
+  constexpr double kHalfWidthMm = 2.5, kToothMm = 1.2, kDeepMm = 0.6;
+  const int steps = static_cast<int>(std::ceil((end + thick) / (kToothMm / 4)));
+  rings.lift();
+  for (int n = 0; n <= steps; ++n) {
+    const double z = -thick + (end + thick) * n / steps, tip = std::clamp((z + thick) / 1.5, 0.05, 1.0);
+    const double tooth = std::abs(2 * (z / kToothMm - std::floor(z / kToothMm)) - 1);  // 0 at the root, 1 at the point
+    rings.ring(
+        [&](double angle) {
+          const double c = std::cos(angle), s = std::sin(angle);
+          // The teeth are where the edge is felt: at the axis; the back lies behind it.
+          const double edge = thick - kDeepMm * (1 - tooth), across = s > 0 ? s * edge : s * 2 * kHalfWidthMm * tip;
+          return Vec3{0.8 * thick * c * std::min(1.0, tip + 0.2), across, z};
+        },
+        [&](double angle) { return std::sin(angle) > 0.3 ? mix(kTooth, kSteel, 0.5 * tooth) : kSteel; });
+  }
+}
+
 }  // namespace
 
 int flutes_of(const Burr& burr) {
@@ -169,6 +191,8 @@ vtkSmartPointer<vtkPolyData> tip_surface(const Instrument& i) {
     rings.circle(-r, 0.5 * (wall + 1) * r, rim);
     rings.circle(-0.9 * r, r, rim);
     rings.circle(begin, r, kSteel);
+  } else if (i.kind == InstrumentKind::saw) {
+    blade(rings, head);
   } else if (i.name.starts_with("hook")) {
     // A rod that turns aside within the ball that is felt.
     const double rod = 0.3 * r;
@@ -218,7 +242,7 @@ ShaftSurface shaft_surface(const Instrument& i, const std::function<bool(Vec3)>&
     const double z = begin + (end - begin) * n / steps;
     rings.circle(z, r, near > 0 ? kTouches : i.kind == InstrumentKind::irrigator ? mix(kSteel, {0.45, 0.62, 0.85}, 0.5) : kSteel);
   }
-  if (i.as_burr() != nullptr) {
+  if (i.cutter() != nullptr) {
     // The collet and the handpiece behind it: not felt.
     constexpr double kBackMm = 75;
     for (const auto& [z, radius, colour] : {std::array<double, 3>{0, 1.9, 0},

@@ -90,12 +90,12 @@ void InstrumentView::tell_apart(Vec3 colour, double opacity) {
   for (Impl::Part* const p : {&impl_->head, &impl_->shaft}) p->actor->GetProperty()->SetOpacity(opacity);
 }
 
-void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid) {
+void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid, const CuttingGuide& guide) {
   Impl& m = *impl_;
   if ((tick.flags & kPlateInHand) != 0) return hide();
   if (m.tool != tick.device.tool) m.choose(tick.device.tool);
   const Instrument& held = instrument_of(tick.device.tool);
-  const Vec3 axis = normalized(from_floats(tick.device.axis)), hand = from_floats(tick.device.position_mm);
+  const Vec3 axis = tool_axis(tick, guide), hand = from_floats(tick.device.position_mm);
   const Vec3 off = from_floats(tick.shown_offset_mm);
   // At the bone's surface, not in it, however far the hand has sunk in.
   const RigidTransform pose{frame_of_axis(axis), hand + off};

@@ -48,16 +48,31 @@ void HandTools::renew(Vec3 centre_mm, double size_mm) {
   handle_mm_ = centre_mm;
   cut_ = SawCut{};
   cut_.at_mm = centre_mm;
+  saw_in_hand_ = false;
   note_.clear();
 }
 
 void HandTools::choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view) {
-  if (tool == tool_) tool = Tool::drill;  // the same key puts it away
+  if (tool == tool_ || (saw_in_hand_ && tool == Tool::saw)) tool = Tool::drill;  // the same key puts it away
   if (tool_ == Tool::plate && tool != Tool::plate) rehearsal.act(SceneAction::grip(SceneAction::kNobody));
+  put_saw_away(rehearsal);
   tool_ = tool;
   note_.clear();
   if (tool == Tool::saw) aim_saw(view, false);
   if (tool == Tool::plate) grip(rehearsal);
+}
+
+void HandTools::take_saw(Rehearsal& rehearsal) {
+  tool_ = Tool::drill;
+  saw_in_hand_ = true;
+  rehearsal.act(SceneAction::cutting_guide(guide()));
+  note_ = "saw in the hand, held in its plane: " + key_name(Command::bring) + " brings it, " + key_name(Command::saw) + " puts it away";
+}
+
+void HandTools::put_saw_away(Rehearsal& rehearsal) {
+  if (!saw_in_hand_) return;
+  saw_in_hand_ = false;
+  rehearsal.act(SceneAction::cutting_guide({}));
 }
 
 void HandTools::aim_saw(const ViewAxes& view, bool flat) {
@@ -208,7 +223,7 @@ bool HandTools::key(Command command, Rehearsal& rehearsal, const ViewAxes& view)
       perform(rehearsal);
       return tool_ != Tool::drill;
     case Command::put_away:
-      if (tool_ == Tool::drill) return false;
+      if (tool_ == Tool::drill && !saw_in_hand_) return false;
       choose(tool_, rehearsal, view);
       return true;
     default:

@@ -36,6 +36,11 @@ class HandTools {
   /// Cuts, takes apart, fixes the plate: what the tool is for.
   void perform(Rehearsal& rehearsal);
   void undo(Rehearsal& rehearsal);
+  /// The saw into the hand, where the blade's plane becomes a cutting guide; what it cuts then is by force and time, as with a burr.
+  void take_saw(Rehearsal& rehearsal);
+  void put_saw_away(Rehearsal& rehearsal);
+  [[nodiscard]] bool saw_in_hand() const { return saw_in_hand_; }
+  [[nodiscard]] CuttingGuide guide() const { return {cut_.at_mm, normalized(cut_.normal), kGuideMm}; }
 
   /// Of the saw. Another one: as set in a panel.
   [[nodiscard]] const SawCut& cut() const { return cut_; }
@@ -65,6 +70,7 @@ class HandTools {
   [[nodiscard]] std::string how() const;
 
  private:
+  static constexpr double kGuideMm = 3;  // how far from its plane the hand may be for the saw to slip in
   void turn_saw(Vec3 axis, double angle_rad);
   void move_piece(Rehearsal& rehearsal, const RigidTransform& by);
   void attach(Rehearsal& rehearsal);
@@ -78,6 +84,7 @@ class HandTools {
   Vec3 handle_mm_;       // its middle
   std::size_t plate_ = 0;
   float turn_deg_ = 0, tilt_deg_ = 0;
+  bool saw_in_hand_ = false;
   std::string note_;
 };
 

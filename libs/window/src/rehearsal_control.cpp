@@ -109,7 +109,14 @@ void RehearsalControl::watch() {
 // --- the hand
 
 Vec3 RehearsalControl::wanted_axis() const {
-  return handle_.axis(view_);
+  const Vec3 axis = handle_.axis(view_);
+  // The blade along its plane: a mouse cannot feel which way that is.
+  return tools_.saw_in_hand() && std::abs(dot(axis, tools_.guide().normal)) < 0.98 ? tools_.guide().along(axis) : axis;
+}
+
+int RehearsalControl::instrument() const {
+  static const int saw = instrument_index("saw 25 mm");
+  return tools_.saw_in_hand() ? saw : tool_;
 }
 
 // Where the hand is; before the first tick, where it will be.
@@ -121,7 +128,7 @@ HandPose RehearsalControl::hand_pose() const {
 
 FreeWays RehearsalControl::free_ways(bool whole_tool) const {
   ToolSkin skin = plate_in_hand() ? skin_of_plate(tools_.plate(), tools_.plate_grip())
-                                  : skin_of_instrument(static_cast<std::size_t>(tool_), whole_tool);
+                                  : skin_of_instrument(static_cast<std::size_t>(instrument()), whole_tool);
   std::optional<FreeWays> ways;
   rehearsal().look([&](const World& world, SceneReaders&) { ways.emplace(world, std::move(skin), rehearsal().structures()); });
   return *std::move(ways);
@@ -166,7 +173,7 @@ void RehearsalControl::turn_handle(double seconds) {
 
 void RehearsalControl::send_goal(double seconds) {
   Device& device = rehearsal().device();
-  device.set_tool(static_cast<std::uint8_t>(tool_));
+  device.set_tool(static_cast<std::uint8_t>(instrument()));
   if (leading_) {
     latched_ = false;
     return;
@@ -181,7 +188,7 @@ void RehearsalControl::send_goal(double seconds) {
   }
   turn_handle(seconds);
   goal_.axis = to_floats(axis_);
-  goal_.tool = static_cast<std::uint8_t>(tool_);
+  goal_.tool = static_cast<std::uint8_t>(instrument());
   goal_.pedal = pedal;
   mouse->set_goal(goal_);
 }
@@ -284,6 +291,7 @@ void RehearsalControl::take_burr(int tool) {
     return;
   }
   tool_ = tool;
+  tools_.put_saw_away(rehearsal());
 }
 void RehearsalControl::take_burr(BurrKind kind) {
   take_burr(burr_index(kind, burr().diameter_mm, burr().shape));
@@ -314,7 +322,7 @@ void RehearsalControl::set_burr_share(int by) {
 bool RehearsalControl::command(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
   const HandTools::Tool before = tools_.tool();
   // Where the mouse points, or the middle of the picture: there it is seen.
-  if (press.command == Command::saw && before != HandTools::Tool::saw) {
+  if (press.command == Command::saw && before != HandTools::Tool::saw && !tools_.saw_in_hand()) {
     if (const auto hit = bone_seen(direction.value_or(view_.forward))) {
       SawCut cut = tools_.cut();
       cut.at_mm = hit->at_mm;

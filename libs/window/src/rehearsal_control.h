@@ -81,6 +81,8 @@ class RehearsalControl {
   void take_burr(BurrShape shape);
   void take_burr_of(int diameter_mm);
   [[nodiscard]] int tool() const { return tool_; }
+  /// What is in the hand but for a plate, index in instrument_library(): the burr, or the saw.
+  [[nodiscard]] int instrument() const;
   [[nodiscard]] Vec3 goal_mm() const { return goal_.position_mm; }
   [[nodiscard]] bool leading() const { return leading_.has_value(); }
   [[nodiscard]] bool latched() const { return latched_; }

@@ -81,11 +81,11 @@ void RehearsalWindow::show_instruments(Rehearsal& now) {
     const auto solid = [&](Vec3 p) { return is_bone(world, p); };
     for (std::size_t hand = 0; hand < now.hands(); ++hand) {
       TickRecord tick = now.latest(hand);
-      if (tick.tick == 0 && hand == 0) tick.device.tool = static_cast<std::uint8_t>(control_.tool());
+      if (tick.tick == 0 && hand == 0) tick.device.tool = static_cast<std::uint8_t>(control_.instrument());
       if (hand > 0 && (tick.tick == 0 || control_.second_hand_empty())) {
         hands_[hand]->hide();
       } else {
-        hands_[hand]->show(tick, now.rate_hz(), solid);
+        hands_[hand]->show(tick, now.rate_hz(), solid, world.cutting_guide(static_cast<std::uint32_t>(hand)));
       }
     }
   });

@@ -17,7 +17,7 @@ void RehearsalWindow::write_state() {
   state.message = control_.leading() ? "on the way" : control_.message();
   state.leading = control_.leading();
   state.session = actions_.folder();
-  state.tool = burr_library()[static_cast<std::size_t>(control_.tool())].name();
+  state.tool = instrument_library()[static_cast<std::size_t>(control_.instrument())].name;
   state.drill_latched = control_.latched();
   state.help = room_.help().open();
   state.room = room_state();

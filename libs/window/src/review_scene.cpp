@@ -72,7 +72,8 @@ void ReviewScene::show_hands(std::array<std::unique_ptr<InstrumentView>, kMostHa
     if (tick == nullptr) {
       hands[h]->hide();
     } else {
-      hands[h]->show(*tick, player.rate_hz(), [&](Vec3 p) { return is_bone(world, p); });
+      hands[h]->show(
+          *tick, player.rate_hz(), [&](Vec3 p) { return is_bone(world, p); }, world.cutting_guide(static_cast<std::uint32_t>(h)));
     }
   }
 }

@@ -188,6 +188,7 @@ HandFacts Room::hand_facts(const RehearsalControl& control, const SoundOut& soun
   HandFacts f;
   f.burr = control.tool();
   f.tool = static_cast<int>(control.tools().tool());
+  f.saw = control.tools().saw_in_hand();
   f.latched = control.latched();
   f.sucking = control.sucking();
   f.washing = control.washing();

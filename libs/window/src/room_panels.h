@@ -14,8 +14,9 @@ namespace osteo {
 
 /// What the hand has, for buttons that show it.
 struct HandFacts {
-  int burr = 0;  ///< index in burr_library()
-  int tool = 0;  ///< HandTools::Tool
+  int burr = 0;      ///< index in burr_library()
+  int tool = 0;      ///< HandTools::Tool
+  bool saw = false;  ///< in the hand, in place of the burr
   bool latched = false, sucking = false, washing = false, sound = true, before = false, ruler = false;
   bool second_hand = false;  ///< moved by keys
   std::size_t undo_steps = 0;

@@ -37,6 +37,8 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
   ImGui::SameLine();
   if (ImGui::Button("flat")) tools.aim_saw(view, true);
   if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
+  // By force and time, with this plane as the cutting guide.
+  if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
 }
 
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
@@ -78,7 +80,7 @@ void tell_collision(double mm) {
 }  // namespace
 
 void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw) {
-  if (tools.tool() != Tool::saw) return;
+  if (tools.tool() != Tool::saw && !tools.saw_in_hand()) return;
   const SawCut& cut = tools.cut();
   const auto middle = project(cut.at_mm);
   if (!middle) return;
@@ -124,7 +126,8 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
       {"drill", Tool::drill}, {"saw (X)", Tool::saw}, {"pieces (P)", Tool::piece}, {"plates (L)", Tool::plate}};
   for (const auto& [name, tool] : kTools) {
     if (tool != Tool::drill && tool != Tool::piece) ImGui::SameLine();
-    if (ImGui::RadioButton(name, tools.tool() == tool) && tools.tool() != tool) tools.choose(tool, rehearsal, view);
+    const bool held = tools.tool() == tool && !tools.saw_in_hand();
+    if (ImGui::RadioButton(name, held) && !held) tools.choose(tool, rehearsal, view);
   }
   if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view);
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
@@ -158,8 +161,9 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
 
 void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world) {
   const SawCut& cut = tools.cut();
-  plane_->SetVisibility(tools.tool() == Tool::saw ? 1 : 0);
-  if (tools.tool() == Tool::saw) {
+  const bool shown = tools.tool() == Tool::saw || tools.saw_in_hand();
+  plane_->SetVisibility(shown ? 1 : 0);
+  if (shown) {
     const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(n, cut.along)), across = cross(n, along);
     const double half_long = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
     const double half_deep = (cut.depth_mm > 0 ? cut.depth_mm : 1.4 * tools.size_mm()) / 2;

@@ -98,9 +98,9 @@ StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const
     return f;
   }
   if (!f.warning.empty()) return f;
-  const Burr* const burr = instrument_of(tick.device.tool).as_burr();
+  const Burr* const edge = instrument_of(tick.device.tool).cutter();
   f.lasts = true;
-  if (burr != nullptr) f.warning = too_small_for_voxels(*burr, rehearsal.finest_voxel_mm());
+  if (edge != nullptr) f.warning = too_small_for_voxels(*edge, rehearsal.finest_voxel_mm());
   if (f.warning.empty() && rehearsal.pieces() > 1) f.warning = text_of("the bone is in %d pieces", rehearsal.pieces());
   return f;
 }

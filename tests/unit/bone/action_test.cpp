@@ -60,6 +60,9 @@ TEST(Action, RowsSayWhatTheWorldDoes) {
       case ActionKind::guide:
         a.item = 1;  // leads hand 0
         break;
+      case ActionKind::cutting_guide:
+        a = SceneAction::cutting_guide({{2, 0, 0}, {1, 0, 0}, 2});
+        break;
       case ActionKind::attach:
         a = lying;
         break;

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "osteo/bone/cutting_guide.h"
 #include "osteo/bone/rigid_transform.h"
 #include "osteo/bone/saw.h"
 
@@ -15,23 +16,24 @@ inline constexpr std::uint32_t kMostHands = 4;
 
 /// Numbers are those of session files: a new kind goes to the end, with its row in action_table().
 enum class ActionKind : std::uint32_t {
-  hold = 1,   ///< nothing may be removed until the next action that ends it: something is being prepared
-  resume,     ///< it may again
-  saw,        ///< take out a blade's width
-  split,      ///< take apart what does not hang together
-  move,       ///< put a piece somewhere, and all that is plated to it
-  grip,       ///< take a plate into a hand, turn it, or put it away
-  attach,     ///< fix a plate to one piece or two
-  detach,     ///< take a plate off
-  open,       ///< set the gap of a distractor
-  suction,    ///< a sucker at a place; rate 0: away
-  irrigate,   ///< water at a place; rate 0: away
-  undo,       ///< take back the last stroke of the burr, saw, split, move, attach, detach or open
-  soft_push,  ///< what soft tissue pushes with near the tool, until the next of these
-  setting,    ///< one of the haptic settings has another value
-  stroke,     ///< a stroke of the burr has ended: a step that undo can take back
-  posture,    ///< the patient lies otherwise: what is down for dust and water
-  guide,      ///< one hand is led by another from here on, or let go
+  hold = 1,       ///< nothing may be removed until the next action that ends it: something is being prepared
+  resume,         ///< it may again
+  saw,            ///< take out a blade's width
+  split,          ///< take apart what does not hang together
+  move,           ///< put a piece somewhere, and all that is plated to it
+  grip,           ///< take a plate into a hand, turn it, or put it away
+  attach,         ///< fix a plate to one piece or two
+  detach,         ///< take a plate off
+  open,           ///< set the gap of a distractor
+  suction,        ///< a sucker at a place; rate 0: away
+  irrigate,       ///< water at a place; rate 0: away
+  undo,           ///< take back the last stroke of the burr, saw, split, move, attach, detach or open
+  soft_push,      ///< what soft tissue pushes with near the tool, until the next of these
+  setting,        ///< one of the haptic settings has another value
+  stroke,         ///< a stroke of the burr has ended: a step that undo can take back
+  posture,        ///< the patient lies otherwise: what is down for dust and water
+  guide,          ///< one hand is led by another from here on, or let go
+  cutting_guide,  ///< a slot that holds a hand's saw in a plane, or none
   behind_last
 };
 
@@ -39,6 +41,7 @@ enum class ActionKind : std::uint32_t {
 struct SceneAction {
   static constexpr std::uint32_t kNobody = 0xffffffffU;
   static constexpr double kMostReachMm = 50;  ///< of a sucker and of water
+  static constexpr double kMostSlotMm = 10;   ///< that a saw slips into a cutting guide from
   static constexpr double kPlateReachMm = 5;  ///< attach: bone of each piece begins within this below the plate's underside
 
   std::uint64_t tick = 0;
@@ -65,8 +68,10 @@ struct SceneAction {
   /// A plane through `at`, pushing along `normal` (unit) with `force_n` there and more by `stiffness` for each mm deeper.
   static SceneAction soft_push(Vec3 at_mm, Vec3 normal, double force_n, double stiffness_n_per_mm);
   static SceneAction setting(std::uint32_t number, double value);
+  static SceneAction cutting_guide(const CuttingGuide& guide, std::uint32_t hand = 0);  ///< its normal need not be unit
   [[nodiscard]] SawCut saw_cut() const;
   [[nodiscard]] RigidTransform transform() const;
+  [[nodiscard]] CuttingGuide guide() const;  ///< of a cutting_guide
 };
 static_assert(sizeof(SceneAction) == 128);
 

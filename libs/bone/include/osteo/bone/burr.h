@@ -35,9 +35,10 @@ struct Burr {
   double rate_mm3_per_s_per_n = 6;
   double falloff_mm3_per_s_per_n_per_rad = 3;
   BurrShape shape = BurrShape::ball;
+  double length_mm = 0;  ///< of a saw's edge, a cylinder, between the centres of its domes; 0: a burr's, as its diameter has it
   static constexpr double kNominalRpm = 60000;
 
-  [[nodiscard]] std::string name() const;  ///< "cutting 4 mm", "diamond taper 3 mm"
+  [[nodiscard]] std::string name() const;  ///< "cutting 4 mm", "diamond taper 3 mm", "saw 25 mm"
   /// The head, its tip's centre at the origin, handle along +z.
   [[nodiscard]] RoundCone head() const;
   /// The shaft behind it, as thick as a surgical drill's (2.35 mm) or, behind a small burr, 0.7 of the burr.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "osteo/bone/action.h"
+#include "osteo/bone/cutting_guide.h"
 #include "osteo/bone/hardness.h"
 #include "osteo/bone/live_components.h"
 #include "osteo/bone/pieces.h"
@@ -80,6 +81,8 @@ class World {
   };
   /// `hand` below kMostHands. attach() leaves its hand without a plate.
   [[nodiscard]] const Grip& grip(std::uint32_t hand = 0) const { return grips_[hand]; }
+  /// That holds a hand's saw. `hand` below kMostHands.
+  [[nodiscard]] const CuttingGuide& cutting_guide(std::uint32_t hand = 0) const { return guides_[hand]; }
   [[nodiscard]] bool held() const { return held_; }
   /// How many steps undo can take back.
   [[nodiscard]] std::size_t undo_steps() const;
@@ -169,6 +172,7 @@ class World {
   std::size_t stroke_bytes_ = 0;
   std::uint64_t steps_forgotten_ = 0;
   std::array<Grip, kMostHands> grips_;
+  std::array<CuttingGuide, kMostHands> guides_;
   std::uint32_t next_body_ = 1, next_fixture_ = 1, next_brick_ = 0;
   bool held_ = false;
 };

@@ -78,7 +78,8 @@ struct HapticScene {
   };
   std::vector<Item> items;
   std::array<Held, kMostHands> held;
-  std::vector<VoxelChange> changes;  ///< room for those of a tick
+  std::array<CuttingGuide, kMostHands> guides;  ///< of the hands' saws
+  std::vector<VoxelChange> changes;             ///< room for those of a tick
 
   /// One more body there.
   void add(std::shared_ptr<TouchedBone> bone, const RigidTransform& world_from_body, const HapticSetup& setup);

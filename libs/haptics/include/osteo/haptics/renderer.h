@@ -30,6 +30,7 @@ class HandRenderer;
 /// plate in the hand, its contact alone. Then the limits of Guard.
 /// The burr's speed follows speed_rpm * pedal / 255 as a first-order lag, spin_up_s upwards and spin_down_s downwards, and is there within
 /// 60 rpm. It removes, drags and shakes as long as it turns. Another instrument taken up stands still.
+/// A saw in a cutting guide (HapticScene::guides) touches, cuts and injures where the guide has it, which shown_offset_mm tells (SawSlot).
 /// Several bodies: what the burr overlaps in each is added up before the law of force is applied, so that a cut through bone that nobody
 /// has opened cannot be felt (other methods than overlap: forces are added). At most kMostTouched bodies in a tick, the first in order.
 class HapticRenderer {

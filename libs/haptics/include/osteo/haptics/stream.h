@@ -47,6 +47,7 @@ enum TickFlag : std::uint32_t {
   kSoftContact = 8192,       ///< soft tissue pushes the tool
   kNoRoom = 16384,           ///< bone that the burr covers in part was left: too many voxels are (Grains::room)
   kGuided = 32768,           ///< another hand led it: its force is not its own alone
+  kInSlot = 65536,           ///< the saw is in a cutting guide: it cuts in the guide's plane, wherever the hand is
 };
 
 /// One tick of one hand, as it is written to session files (little endian). With several hands each tick has one of these for each, in

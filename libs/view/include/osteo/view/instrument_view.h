@@ -5,7 +5,7 @@
 
 #include "osteo/bone/instrument.h"
 #include "osteo/bone/world.h"
-#include "osteo/haptics/stream.h"
+#include "osteo/haptics/saw_slot.h"
 
 class vtkRenderer;
 
@@ -39,7 +39,8 @@ class InstrumentView {
 
   /// `solid`: whether a place in the world lies in bone, asked some thousand times where the shaft touches (kShaftContact); none: no bone.
   /// `rate_hz`: ticks a second. Cost: 5 us; where the shaft touches or a burr comes up to speed some 0.2 ms.
-  void show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid = {});
+  /// `guide`: of this hand (World::cutting_guide).
+  void show(const TickRecord& tick, double rate_hz, const std::function<bool(Vec3)>& solid = {}, const CuttingGuide& guide = {});
   void hide();
   /// The handle in a colour of its own (red, green, blue, 0 to 1), which tells whose it is; `opacity` below 1: of one that is not there.
   void tell_apart(Vec3 colour, double opacity);

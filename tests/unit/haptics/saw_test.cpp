@@ -1,0 +1,205 @@
+// A saw that cuts by force and time, in a cutting guide and without one.
+#include "osteo/haptics/saw_slot.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "bar.h"
+#include "osteo/grid/brick_places.h"
+#include "osteo/haptics/device.h"
+#include "osteo/haptics/renderer.h"
+
+namespace osteo {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+const int kSaw = instrument_index("saw 25 mm");
+const CuttingGuide kGuide{{2, 0, 0}, {1, 0, 0}, 3};
+
+DeviceSample held(Vec3 x, Vec3 axis, int tool = kSaw, bool pedal = true) {
+  DeviceSample s;
+  s.position_mm = to_floats(x);
+  s.axis = to_floats(normalized(axis));
+  s.pedal = pedal ? 255 : 0;
+  s.tool = static_cast<std::uint8_t>(tool);
+  return s;
+}
+HapticSetup setup() {
+  HapticSetup s;
+  s.device = SpringHand::traits();
+  return s;
+}
+
+// What a saw does to a bar of 30 x 10 x 8 mm that it is led down through: the blade lies along y, the hand is where `hand` says.
+struct Cut {
+  World world{test::bar(0.25, 0.4)};
+  double removed_mm3 = 0, middle_mm = 0, spread_mm = 0, farthest_mm = 0, most_n = 0, shown_off_mm = 0, seconds = 0;
+  std::vector<TickRecord> records;
+
+  explicit Cut(const CuttingGuide& guide, const std::function<DeviceSample(double t_s, double z_mm)>& hand, double mm_per_s = 1) {
+    EXPECT_TRUE(world.act(SceneAction::cutting_guide(guide)).done);
+    const HapticSetup s = setup();
+    HapticScene scene = HapticScene::of(world, s);
+    HapticRenderer r(s, {}, 1e-3);
+    r.show(&scene);
+    const BrickGrid& bone = world.bodies().front().body->bone;
+    const double voxel = bone.frame().voxel_volume_mm3();
+    double sum = 0, squares = 0;
+    seconds = 10.4 / mm_per_s;
+    for (int t = 0; t < seconds * 1000; ++t) {
+      const double t_s = t / 1000.0, z = 5.2 - mm_per_s * t_s;
+      const HapticRenderer::HandStep step = r.step(hand(t_s, z));
+      for (const VoxelChange& c : step.changes) {
+        const double gone = static_cast<double>(c.before - c.density) * voxel, x = place_of_voxel_mm(bone, c.voxel).x - kGuide.at_mm.x;
+        removed_mm3 += gone;
+        sum += gone * x;
+        squares += gone * x * x;
+        if (c.before - c.density > 0.02F) farthest_mm = std::max(farthest_mm, std::abs(x));
+      }
+      const Vec3 tip = from_floats(step.record.device.position_mm) + from_floats(step.record.shown_offset_mm);
+      if (t > 300) shown_off_mm = std::max(shown_off_mm, std::abs(tip.x - kGuide.at_mm.x));
+      most_n = std::max(most_n, static_cast<double>(step.record.normal_force_n));
+      records.push_back(step.record);
+    }
+    middle_mm = sum / removed_mm3;
+    spread_mm = std::sqrt(squares / removed_mm3 - middle_mm * middle_mm);
+  }
+  std::size_t pieces() {
+    EXPECT_TRUE(world.act(SceneAction::plain(ActionKind::hold)).done);
+    static_cast<void>(world.act(SceneAction::split(5)));
+    return world.bodies().size();
+  }
+};
+
+DeviceSample steady(double, double z) {
+  return held({2, -12, z}, {0, 1, 0});
+}
+// An unsteady hand: 1.5 mm to and fro across the plane, 12 degrees askew, and 0.4 mm off.
+DeviceSample unsteady(double t, double z) {
+  return held({2.4 + 1.5 * std::sin(kTurn * 0.9 * t), -12, z}, {0.21 * std::sin(kTurn * 0.6 * t + 1), 1, 0.05});
+}
+
+TEST(HandSaw, CutsAStraightKerfByForceAndTime) {
+  Cut c({}, steady);
+  // The section is 10 x 8 mm, the blade 1 mm thick.
+  EXPECT_NEAR(c.removed_mm3 / 80, 1.0, 0.05);
+  EXPECT_NEAR(c.middle_mm, 0, 0.02);
+  EXPECT_NEAR(c.spread_mm, 1 / std::sqrt(12.0), 0.05);
+  EXPECT_LT(c.farthest_mm, 0.5 + 0.25);
+  EXPECT_EQ(c.pieces(), 2U);
+  for (const TickRecord& r : c.records) EXPECT_EQ(r.flags & kInSlot, 0U);
+  // Twice as fast it presses harder for the same bone.
+  EXPECT_GT(Cut({}, steady, 2).most_n, 1.5 * c.most_n);
+}
+
+TEST(HandSaw, TheGuideMakesAnUnsteadyHandsCutAStraightOne) {
+  Cut free({}, unsteady), led(kGuide, unsteady);
+  EXPECT_GT(free.spread_mm, 3 * led.spread_mm);
+  EXPECT_NEAR(led.removed_mm3 / 80, 1.0, 0.1);
+  EXPECT_NEAR(led.middle_mm, 0, 0.05);
+  EXPECT_NEAR(led.spread_mm, 1 / std::sqrt(12.0), 0.06);
+  EXPECT_LT(led.farthest_mm, 0.5 + 0.3);
+  EXPECT_EQ(led.pieces(), 2U);
+  // The blade is shown where it cuts, and the hand is pulled there.
+  EXPECT_LT(led.shown_off_mm, 0.3);
+  double against = 0;
+  for (std::size_t t = 300; t < led.records.size(); ++t) {
+    const TickRecord& r = led.records[t];
+    ASSERT_NE(r.flags & kInSlot, 0U) << t;
+    const double off = static_cast<double>(r.device.position_mm[0]) - 2;
+    if (std::abs(off) > 0.5 && static_cast<double>(r.force_n[0]) * off > 0) ++against;
+    EXPECT_NEAR(tool_axis(r, led.world.cutting_guide()).x, 0, 1e-6);
+  }
+  EXPECT_LT(against, 0.02 * static_cast<double>(led.records.size())) << "the spring pulls towards the plane";
+}
+
+// A guide far away, or with another instrument in the hand, changes no bit.
+TEST(HandSaw, AGuideThatHoldsNothingIsNothing) {
+  const auto same_bits = [](const Cut& a, const Cut& b) {
+    ASSERT_EQ(a.records.size(), b.records.size());
+    for (std::size_t t = 0; t < a.records.size(); ++t) {
+      ASSERT_EQ(a.records[t].force_n, b.records[t].force_n) << t;
+      ASSERT_EQ(a.records[t].removed_mm3, b.records[t].removed_mm3) << t;
+      ASSERT_EQ(a.records[t].flags, b.records[t].flags) << t;
+    }
+  };
+  same_bits(Cut({}, steady), Cut({{2, 0, 40}, {0, 0, 1}, 3}, steady));
+  const auto drill = [](double t, double z) {
+    DeviceSample s = unsteady(t, z);
+    s.tool = static_cast<std::uint8_t>(burr_index(BurrKind::cutting, 2));
+    return s;
+  };
+  same_bits(Cut({}, drill), Cut(kGuide, drill));
+}
+
+// In and out with hysteresis, and never with a jump.
+TEST(HandSaw, SlipsInAndOutWithoutAJump) {
+  SawSlot slot;
+  Vec3 last_at, last_axis{0, 1, 0};
+  int in = 0, turned = 0;
+  bool was = false;
+  for (int t = 0; t < 6000; ++t) {
+    // From 20 mm away through the plane and out at the other side.
+    Vec3 at{2 + 20 - t / 150.0, 0, 0}, axis = normalized({0.3, 1, 0});
+    const double hand_off = at.x - 2;
+    const bool now = slot.step(kGuide, true, at, axis, 1e-3);
+    if (t > 0) {
+      EXPECT_LT(length(at - last_at), 0.15) << t;
+      EXPECT_LT(length(axis - last_axis), 0.02) << t;
+    }
+    if (now && !was) {
+      EXPECT_NEAR(hand_off, kGuide.within_mm, 0.05);
+      ++in;
+    }
+    if (!now && was) {
+      EXPECT_NEAR(hand_off, -SawSlot::kLeaveTimes * kGuide.within_mm, 1.2);
+      ++turned;
+    }
+    const Vec3 pull = slot.force_n(4, 8);
+    EXPECT_TRUE(!now || pull.x * hand_off <= 0) << t;
+    EXPECT_LE(length(pull), 8 + 1e-9);
+    was = now;
+    last_at = at;
+    last_axis = axis;
+  }
+  EXPECT_EQ(in, 1);
+  EXPECT_EQ(turned, 1);
+  // Too steep to slip in; and what is no saw never does.
+  SawSlot other;
+  Vec3 at{2, 0, 0}, axis = normalized({1, 1, 0}), before = axis;
+  EXPECT_FALSE(other.step(kGuide, true, at, axis, 1e-3));
+  axis = {0, 1, 0};
+  EXPECT_FALSE(other.step(kGuide, false, at, axis, 1e-3));
+  EXPECT_EQ(axis, (Vec3{0, 1, 0}));
+  static_cast<void>(before);
+  // Taken away while the saw is in it: the hand is let go of gently.
+  for (int t = 0; t < 300; ++t) other.step(kGuide, true, at = {3, 0, 0}, axis, 1e-3);
+  EXPECT_NEAR(other.force_n(4, 8).x, -4, 1e-9);
+  double last = -4;
+  for (int t = 0; t < 200; ++t) {
+    static_cast<void>(other.step({}, true, at = {3, 0, 0}, axis, 1e-3));
+    EXPECT_LE(std::abs(other.force_n(4, 8).x - last), 0.05);
+    last = other.force_n(4, 8).x;
+  }
+  EXPECT_EQ(last, 0);
+}
+
+TEST(HandSaw, AGuideIsCheckedBeforeItIsThere) {
+  World w(test::bar(0.5, 0.4));
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, -1})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 11})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {0, 0, 0}, 2})).done);
+  EXPECT_FALSE(w.act(SceneAction::cutting_guide({{}, {1, 0, 0}, 2}, kMostHands)).done);
+  EXPECT_FALSE(w.cutting_guide().on());
+  ASSERT_TRUE(w.act(SceneAction::cutting_guide({{1, 2, 3}, {0, 0, 5}, 2}, 1)).done);
+  EXPECT_FALSE(w.cutting_guide(0).on());
+  EXPECT_EQ(w.cutting_guide(1), (CuttingGuide{{1, 2, 3}, {0, 0, 1}, 2}));
+  ASSERT_TRUE(w.act(SceneAction::cutting_guide({}, 1)).done);
+  EXPECT_FALSE(w.cutting_guide(1).on());
+}
+
+}  // namespace
+}  // namespace osteo
