@@ -18,14 +18,14 @@ std::size_t most_hits(double spacing_mm) {
   return static_cast<std::size_t>(std::min(most / (spacing_mm * spacing_mm * spacing_mm), 4.0 * kMostCutPerTick)) + 1024;
 }
 
-std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm) {
+std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools) {
   switch (params.method) {
     case ContactMethod::rays:
       return std::make_unique<RaySampling>(params, spacing_mm);
     case ContactMethod::volume:
       return std::make_unique<VolumeSampling>(params, spacing_mm);
     case ContactMethod::proxy:
-      return std::make_unique<BurrProxy>(params, spacing_mm);
+      return std::make_unique<BurrProxy>(params, spacing_mm, tools);
     default:
       return std::make_unique<ExactOverlap>(params, spacing_mm);
   }

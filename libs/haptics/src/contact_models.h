@@ -68,7 +68,8 @@ class ExactOverlap final : public ContactModel {
 /// God-object of the whole burr: it stays where its overlap with bone is that of a light touch, whatever the hand does.
 class BurrProxy final : public ContactModel {
  public:
-  BurrProxy(const ContactParams& params, double spacing_mm);
+  /// For these instruments; none: all. Others feel nothing.
+  BurrProxy(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools);
   ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept override;
   [[nodiscard]] Cut cut(const BrickGrid& bone) noexcept override;
 
@@ -77,7 +78,7 @@ class BurrProxy final : public ContactModel {
  private:
   double spacing_mm_;
   std::vector<RoundCone> shells_;
-  const std::vector<CutDepth>& shell_depths_;
+  std::vector<const CutDepth*> shell_depths_;
   Overlap overlap_;
   HeadOverlap head_;
   GodObject proxy_;

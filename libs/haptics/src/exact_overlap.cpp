@@ -14,16 +14,14 @@ RoundCone shell_of(RoundCone head, double spacing_mm) {
   return head;
 }
 
-// Tables of all shells take a quarter of a second: kept for each spacing that was used.
-const std::vector<CutDepth>& shell_depths(double spacing_mm) {
+// A table takes 2 ms: kept for each spacing and instrument that was used.
+const CutDepth& shell_depth(double spacing_mm, std::size_t tool) {
   static std::mutex mutex;
-  static std::map<double, std::vector<CutDepth>> known;
+  static std::map<std::pair<double, std::size_t>, CutDepth> known;
   const std::lock_guard lock(mutex);
-  std::vector<CutDepth>& tables = known[spacing_mm];
-  if (tables.empty()) {
-    for (const Instrument& i : instrument_library()) tables.emplace_back(shell_of(i.head, spacing_mm));
-  }
-  return tables;
+  const auto key = std::pair(spacing_mm, tool);
+  const auto it = known.find(key);
+  return it != known.end() ? it->second : known.try_emplace(key, shell_of(instrument_library()[tool].head, spacing_mm)).first->second;
 }
 
 // With more voxels under the burr than may change in a tick, their rows take turns.
@@ -92,9 +90,12 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
   return head_.cut();
 }
 
-BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm)
-    : ContactModel(params), spacing_mm_(spacing_mm), shell_depths_(shell_depths(spacing_mm)), overlap_(0), head_(spacing_mm) {
+BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools)
+    : ContactModel(params), spacing_mm_(spacing_mm), shell_depths_(instrument_library().size()), overlap_(0), head_(spacing_mm) {
   for (const Instrument& i : instrument_library()) shells_.push_back(shell_of(i.head, spacing_mm));
+  for (std::size_t tool = 0; tool < shells_.size(); ++tool) {
+    if (tools.empty() || std::find(tools.begin(), tools.end(), tool) != tools.end()) shell_depths_[tool] = &shell_depth(spacing_mm, tool);
+  }
 }
 
 ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
@@ -108,7 +109,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   // The proxy is a shell around the burr, half a voxel thick, that bone fills to exactly its depth: the cut of a shell that deep is
   // measured well, where a bare touch would be lost in the voxels.
   const double shell = 0.5 * spacing_mm_;
-  const CutDepth& depths = shell_depths_[tool_];
+  if (shell_depths_[tool_] == nullptr) return r;
+  const CutDepth& depths = *shell_depths_[tool_];
   Vec3 where;
   OverlapResult there;
   const auto field = [&](Vec3 x) {
@@ -141,6 +143,8 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   g.feature_mm = 0.5 * spacing_mm_;
   g.tolerance_mm = 1e-2 * spacing_mm_;
   g.evaluations = spacing_mm_ < 0.3 ? 8 : 16;  // 100 to 200 us at most
+  // A blade's shell meets ten times a burr's voxels; what is left over is done in the next tick.
+  if (instrument_library()[tool_].kind == InstrumentKind::saw) g.evaluations = 4;
   const GodObject::Answer answer = proxy_.update(field, at, g);
   const Vec3 offset = answer.proxy_mm - at;
   r.shown_offset_mm = offset;

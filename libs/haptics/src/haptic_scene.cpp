@@ -59,11 +59,12 @@ PlateInHand::PlateInHand(const PlateModel& plate, int count) {
 
 namespace {
 
-// Those that some instrument uses.
-std::array<bool, EnumNames<ContactMethod>::values.size()> wanted_methods(const HapticSetup& setup) {
-  std::array<bool, EnumNames<ContactMethod>::values.size()> wanted{};
-  for (std::size_t tool = 0; tool < instrument_library().size(); ++tool) wanted[static_cast<std::size_t>(method_of(setup, tool))] = true;
-  return wanted;
+// By method, the instruments that use it.
+std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools_by_method(const HapticSetup& setup) {
+  std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;
+  for (std::size_t tool = 0; tool < instrument_library().size(); ++tool)
+    tools[static_cast<std::size_t>(method_of(setup, tool))].push_back(tool);
+  return tools;
 }
 
 // Whatever of an item follows from the setup; `before`: the same body's until now.
@@ -87,26 +88,34 @@ void make_room(HapticScene& scene, const HapticSetup& setup) {
 
 }  // namespace
 
-ContactMethod method_of(const HapticSetup& setup, std::size_t tool) {
+ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept {
   const auto it = setup.tool_methods.find(static_cast<int>(tool));
-  return it == setup.tool_methods.end() ? setup.params.contact.method : it->second;
+  if (it != setup.tool_methods.end()) return it->second;
+  return instrument_library()[tool].kind == InstrumentKind::saw ? ContactMethod::proxy : usual;
 }
 
-HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before) {
-  if (before != nullptr) models = before->models;
-  const auto wanted = wanted_methods(setup);
+HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before) : tools(tools_by_method(setup)) {
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (!wanted[m] || models[m]) continue;
+    if (before != nullptr && before->models[m]) {
+      // What is for more instruments than before is another; one that nobody uses now may be used again.
+      const bool enough = std::includes(before->tools[m].begin(), before->tools[m].end(), tools[m].begin(), tools[m].end());
+      if (enough) {
+        models[m] = before->models[m];
+        tools[m] = before->tools[m];
+        continue;
+      }
+    }
+    if (tools[m].empty()) continue;
     ContactParams p = setup.params.contact;
     p.method = static_cast<ContactMethod>(m);
-    models[m] = make_contact_model(p, spacing_mm);
+    models[m] = make_contact_model(p, spacing_mm, tools[m]);
   }
 }
 
 bool HandContact::serves(const HapticSetup& setup) const {
-  const auto wanted = wanted_methods(setup);
+  const auto wanted = tools_by_method(setup);
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (wanted[m] && !models[m]) return false;
+    if (!std::includes(tools[m].begin(), tools[m].end(), wanted[m].begin(), wanted[m].end())) return false;
   }
   return true;
 }

@@ -27,6 +27,11 @@ inline F root(F a) {
   for (int l = 0; l < 8; ++l) r[l] = __builtin_sqrtf(a[l]);
   return r;
 }
+inline bool any_of(M set) {
+  std::uint64_t any[4];
+  std::memcpy(any, &set, sizeof any);
+  return (any[0] | any[1] | any[2] | any[3]) != 0;
+}
 inline float sum(F a) {
   const float e0 = a[0] + a[4], e1 = a[1] + a[5], e2 = a[2] + a[6], e3 = a[3] + a[7];
   return (e0 + e2) + (e1 + e3);
@@ -79,6 +84,8 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
   const F x = lane + all(first[0]);
   // Half a row and half a voxel's diagonal: a row whose middle is farther than this from the surface is wholly in or out.
   constexpr float kReach = 3.5F + 0.9F;
+  // Farther out than half its diagonal a voxel has no share in the shape.
+  constexpr float kOut = 0.9F;
   F volume{}, weight{}, surface{}, gx{}, gy{}, gz{}, fx{}, fy{}, fz{};
   for (int k = 0; k < 8; ++k) {
     const float z = first[2] + static_cast<float>(k);
@@ -119,7 +126,10 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
         vy = qy - t * ay;
         vz = qz - t * az;
       }
-      const F distance = root(most(vx * vx + vy * vy + vz * vz, all(1e-12F))), inverse = all(1) / distance;
+      const F distance = root(most(vx * vx + vy * vy + vz * vz, all(1e-12F)));
+      // Half of the rows that come here have no voxel at the shape: all that follows would be zeros.
+      if (!whole && !any_of(all(shape.start_radius) - all(shape.slope) * t - distance > all(-kOut))) continue;
+      const F inverse = all(1) / distance;
       const F nx = vx * inverse, ny = vy * inverse, nz = vz * inverse;
       F share = all(1);
       if (!whole) {
@@ -135,9 +145,7 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
         F area;
         cut_cube(radius - distance - curvature, nx, ny, nz, share, area);
         const M both = (density < all(1)) & (density > all(0)) & (share < all(1)) & (share > all(0));
-        std::uint64_t any[4];
-        std::memcpy(any, &both, sizeof any);
-        if ((any[0] | any[1] | any[2] | any[3]) != 0) {
+        if (any_of(both)) {
           for (int l = 0; l < 8 && partial.count < partial.capacity; ++l) {
             if (both[l] == 0) continue;
             partial.items[partial.count++] = {key + static_cast<VoxelKey>(k * 64 + j * 8 + l), density[l], share[l], {nx[l], ny[l], nz[l]}};

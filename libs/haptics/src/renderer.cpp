@@ -59,10 +59,8 @@ void HapticRenderer::set(const HapticsParams& params) noexcept {
   common_->params = params;
   common_->up_share = share_of(params.effects.spin_up_s, common_->dt_s);
   common_->down_share = share_of(params.effects.spin_down_s, common_->dt_s);
-  for (std::size_t tool = 0; tool < common_->method_of_tool.size(); ++tool) {
-    const auto own = setup_.tool_methods.find(static_cast<int>(tool));
-    common_->method_of_tool[tool] = own == setup_.tool_methods.end() ? params.contact.method : own->second;
-  }
+  for (std::size_t tool = 0; tool < common_->method_of_tool.size(); ++tool)
+    common_->method_of_tool[tool] = method_of(setup_, params.contact.method, tool);
   for (const auto& hand : hands_) hand->set();
 }
 

@@ -90,8 +90,10 @@ class ContactModel {
   ContactParams params_;
 };
 
-/// `spacing_mm` of the bone it will meet: sizes its buffers.
-[[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm);
+/// `spacing_mm` of the bone it will meet: sizes its buffers. `tools`: of instrument_library(), that it is for; none: all. (A proxy makes a
+/// table for each, 2 ms.)
+[[nodiscard]] std::unique_ptr<ContactModel> make_contact_model(const ContactParams& params, double spacing_mm,
+                                                               std::span<const std::size_t> tools = {});
 
 /// Below this many voxels of radius a burr is too small for them: flat bone is felt with errors of 10 % of the force and more.
 inline constexpr double kLeastRadiusVoxels = 2;

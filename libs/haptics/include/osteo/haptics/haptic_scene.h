@@ -51,7 +51,8 @@ struct HandContact {
   [[nodiscard]] bool serves(const HapticSetup& setup) const;
 
   std::array<std::shared_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models;
-  ContactModel* in_use = nullptr;  ///< of the instrument in the hand
+  std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
+  ContactModel* in_use = nullptr;                                                       ///< of the instrument in the hand
   Overlap shaft{0};
 };
 
@@ -90,8 +91,12 @@ struct HapticScene {
   [[nodiscard]] bool needs_bone_held(const HapticSetup& setup) const;
 };
 
-/// The method of contact by instrument, as the setup has it.
-[[nodiscard]] ContactMethod method_of(const HapticSetup& setup, std::size_t tool);
+/// The method of contact by instrument, as the setup has it; a saw that nothing is said of goes by its proxy, since a hand would push so
+/// thin a blade through the bone otherwise. `usual`: the method in force, which settings may change.
+[[nodiscard]] ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept;
+[[nodiscard]] inline ContactMethod method_of(const HapticSetup& setup, std::size_t tool) noexcept {
+  return method_of(setup, setup.params.contact.method, tool);
+}
 
 /// Each sample that lies in bone is traced along its normal back out of the bone; the mean of the ways, weighted by area, is the depth and
 /// direction of the push (D. Morris 2006, section 3.2.5, after the ray tracing of section 3.2.3.4). About 30 ns a sample outside bone, 0.2
