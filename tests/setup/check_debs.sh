@@ -66,6 +66,7 @@ with osteo.Rehearsal(sys.argv[1]) as r:
 assert osteo.snapshot(surface).max() > 0
 print("python3-osteo:", len(surface.triangles), "triangles")
 PYTHON
+  [ -s "$work/root/usr/share/doc/python3-osteo/examples/drilled_hole.py" ] || { echo "no examples for Python"; exit 1; }
 fi
 if [ -n "$(deb osteo-full)" ]; then
   install $(deb osteo-full)
