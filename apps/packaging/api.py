@@ -37,30 +37,35 @@ def groups():
         if line.strip() and line[0] != "#":
             name, held = line.split("|")
             of[name.strip()] = held.split()
-    text, placed = ["// Made by apps/packaging/api.py.", "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library."], []
-    components = []
+    components = []  # name, what its example shows, its file, libraries
     for name, _, example in rows("docs/library.md", "component"):
         name = name.strip("`")
-        held = of.get(name, [name])
-        about = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example)
-        components.append((name, about, held))
-    placed = [l for _, _, held in components for l in held]
-    components.append(("others", "", [l for l in libraries if l not in placed]))
-    for name, about, held in components:
+        file, shows = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example).split(": ", 1)
+        components.append((name, shows, file, of.get(name, [name])))
+    placed = {l for *_, held in components for l in held}
+    components.append(("others", "", "", [l for l in libraries if l not in placed]))
+
+    text = ["// Made by apps/packaging/api.py.", "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library."]
+    for name, shows, file, held in components:
         if name == "others":
-            text.append('/// @defgroup component_others Libraries by their own name\n/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`.')
+            text.append("/// @defgroup component_others Libraries by their own name\n"
+                        "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`.")
         else:
-            file, about = about.split(": ", 1)
-            text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. An example, which the test `install` compiles and runs: {about}.\n/// @include {file}")
-        for lib in held:
-            text.append(f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n/// Target `osteo::{lib}`, headers `osteo/{lib}/`.")
-    main = ["/// @mainpage The libraries of Osteotome", "///", "/// C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/library.md:",
-            "/// @code{.cmake}", "/// find_package(osteo REQUIRED COMPONENTS import haptics)", "/// target_link_libraries(mine PRIVATE osteo::import osteo::haptics)", "/// @endcode", "///",
-            "/// | component | libraries |", "/// |---|---|"]
-    for name, _, held in components:
-        main.append(f"/// | @ref component_{name} \"{'by their own names' if name == 'others' else name}\" | " + ", ".join(f"@ref lib_{l}" for l in held) + " |")
-    main += ["///", "/// What a function may throw is osteo::Error, with the exit code of the programs and what to do about it. Values in osteo::Data do not change once they are made, and are shared."]
-    return "\n".join(["\n\n".join(text), *main, ""]), components
+            text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
+                        f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
+        text += [f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
+                 f"/// Target `osteo::{lib}`, headers `osteo/{lib}/`." for lib in held]
+    main = ["@mainpage The libraries of Osteotome", "",
+            "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/library.md:",
+            "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS import haptics)", "target_link_libraries(mine PRIVATE osteo::import osteo::haptics)",
+            "@endcode", "", "| component | libraries |", "|---|---|"]
+    for name, _, _, held in components:
+        shown = "by their own names" if name == "others" else name
+        main.append(f'| @ref component_{name} "{shown}" | ' + ", ".join(f"@ref lib_{l}" for l in held) + " |")
+    main += ["", "What a function may throw is osteo::Error, with the exit code of the programs and what to do about it. Values in osteo::Data do not change once "
+             "they are made, and are shared."]
+    text.append("\n".join(f"/// {l}".rstrip() for l in main))
+    return "\n\n".join(text) + "\n", components
 
 
 def stage(into):
@@ -133,14 +138,12 @@ def check(site, components):
     grouped = {c.findtext("name"): c for c in tags.iter("compound") if c.get("kind") == "group"}
     declared = 0
     for header in root.glob("libs/*/include/**/*.h"):
-        lib = header.relative_to(root / "libs").parts[0]
         for name in re.findall(r"^(?:class|struct|enum class|enum)\s+(\w+)[^;<]*?\{", header.read_text(), re.M):
             declared += 1
             if name not in known:
                 bad.append(f"{header.relative_to(root)}: {name} has no page")
-    for name, _, held in components:
+    for name, *_, held in components:
         for group in [f"component_{name}", *(f"lib_{lib}" for lib in held)]:
-            # In tag files a group's name is its title's twin; its page is named after it.
             if group not in grouped:
                 bad.append(f"no group {group}")
         example = site / f"group__component__{name.replace('_', '__')}.html"
