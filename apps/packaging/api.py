@@ -29,7 +29,7 @@ def plain(text):
 
 
 def groups():
-    """Components with what they hold, as Doxygen's groups; a library is in one."""
+    """Components with what they hold, as Doxygen's groups."""
     holds = {r[0]: plain(r[2]) for r in rows("docs/architecture.md", "library")}
     libraries = [l.split()[0] for l in (root / "libs/layers.txt").read_text().splitlines() if l.strip() and l[0] != "#"]
     of = {}
@@ -49,7 +49,8 @@ def groups():
     for name, shows, file, held in components:
         if name == "others":
             text.append("/// @defgroup component_others Libraries by their own name\n"
-                        "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`.")
+                        "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`. "
+                        "But for `window`: that is the programs' own and not installed.")
         else:
             text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
                         f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
