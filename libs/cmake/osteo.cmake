@@ -100,12 +100,16 @@ function(osteo_library name)
     endforeach()
   endforeach()
   add_library(osteo::${name} ALIAS osteo_${name})
-  # Shared ones carry MAJOR.MINOR: while MAJOR is 0, a MINOR may break. No macro for exports (all is exported), so both kinds are made of the same
-  # objects; each must name all that it takes.
+  # Shared ones carry MAJOR.MINOR: while MAJOR is 0, a MINOR may break. No macro for exports: what is ours is exported by its name, when it is linked
+  # (exports.map), so both kinds are made of the same objects; each must name all that it takes.
   set_target_properties(osteo_${name} PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
     DEFINE_SYMBOL "" INSTALL_RPATH "$ORIGIN")
   if(OSTEO_LIBRARY_KIND STREQUAL SHARED AND NOT OSTEO_SANITIZE AND NOT OSTEO_FUZZ)
     target_link_options(osteo_${name} PRIVATE LINKER:--no-undefined)
+    if(NOT name STREQUAL window)  # the programs' own: they and it share one copy of Dear ImGui
+      target_link_options(osteo_${name} PRIVATE LINKER:--version-script,${PROJECT_SOURCE_DIR}/libs/cmake/exports.map)
+      set_property(TARGET osteo_${name} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/libs/cmake/exports.map)
+    endif()
   endif()
   # So that a shared object (Python, another program's) can take it; calls within a library are inlined as before. Sanitized builds make none.
   if(NOT OSTEO_SANITIZE AND NOT OSTEO_FUZZ)

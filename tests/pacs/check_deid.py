@@ -207,4 +207,53 @@ run("deidentify", "before", "-o", "before-out")
 assert "left out" in run("send", "mixed", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", rc=7).stderr
 assert json.loads(run("send", "two", "--peer", "A@127.0.0.1:1", "--deidentify", "--dry-run", "--json").stdout)["kinds"][0]["objects"] == 2
 assert "--deidentify" in run("send", "two", "--peer", "A@127.0.0.1:1", "--key", "key", "--dry-run", rc=2).stderr
+# 5. What docs/pacs.md says of the standard's options, each row of its table: removed (None), emptied (""), a dummy, or kept (as it was).
+code = Dataset()
+code.CodeValue, code.CodingSchemeDesignator, code.CodeMeaning = "C1", "99X", "Clinic"
+KEPT = object()
+options = {
+    "113109": {"DeviceSerialNumber": "REMOVED", "StationName": "REMOVED", "DetectorID": "REMOVED", "GantryID": None, "PlateID": None, "CassetteID": None,
+               "GeneratorID": None, "DeviceDescription": None, "Manufacturer": KEPT, "ManufacturerModelName": KEPT, "SoftwareVersions": KEPT},
+    "113112": {"InstitutionName": "REMOVED", "InstitutionCodeSequence": "", "InstitutionAddress": None, "InstitutionalDepartmentName": None},
+    "113108": {"PatientSex": "", "PatientAge": None, "PatientSize": None, "PatientWeight": None, "EthnicGroup": None, "SmokingStatus": None,
+               "PregnancyStatus": None, "Allergies": None, "PatientState": None, "PreMedication": None},
+    "113106": {"StudyDate": "", "StudyTime": "", "AcquisitionDate": "", "AcquisitionTime": "", "PatientBirthDate": "", "SeriesDate": "19000101",
+               "ContentDate": "19000101", "SeriesTime": "000000", "ContentTime": "000000", "TimezoneOffsetFromUTC": None},
+    "113105": {"StudyDescription": None, "SeriesDescription": None, "ImageComments": None, "ReasonForStudy": None, "ProtocolName": "REMOVED",
+               "ContrastBolusAgent": "REMOVED", "ConvolutionKernel": KEPT},
+    "113104": {"AcquisitionContextSequence": ""},
+    "113102": {"RecognizableVisualFeatures": KEPT},
+}
+d = base(n=30)
+for fates in options.values():
+    for keyword in fates:
+        vr = dictionary_VR(keyword)
+        setattr(d, keyword, Sequence([code]) if vr == "SQ" else {"DA": "20200131", "TM": "101500", "AS": "040Y", "DS": "70", "US": 4, "CS": "YES"}.get(vr, "Plain"))
+d.PatientSex, d.TimezoneOffsetFromUTC, d.DeviceUID, d.LongitudinalTemporalInformationModified = "F", "+0100", f"{UID}.77", "UNMODIFIED"
+d.add_new(0x00290010, "LO", "SIEMENS CSA HEADER")
+d.add_new(0x00291008, "CS", "IMAGE NUM 4")
+d.add_new(0x60000022, "LO", "A word")
+d.add_new(0x50000030, "SH", "A word")
+save(d, "options/a.dcm")
+run("deidentify", "options", "-o", "options-out", "--key", "key", "--map", "options.json")
+(out,) = read("options-out")
+for option, fates in options.items():
+    for keyword, fate in fates.items():
+        e = out.get(keyword)
+        if fate is None: assert keyword not in out, (option, keyword, e)
+        elif fate == "": assert keyword in out and not e, (option, keyword, e)
+        elif fate is KEPT: assert e == d.get(keyword), (option, keyword, e)
+        else: assert e == fate, (option, keyword, e)
+assert out.DeviceUID.startswith("2.25.") and out.LongitudinalTemporalInformationModified == "REMOVED" and out.PixelData == d.PixelData
+assert not [e for e in out if e.tag.is_private or e.tag.group in (0x5000, 0x6000)]
+assert [c.CodeValue for c in out.DeidentificationMethodCodeSequence] == ["113100"]
+assert json.load(open("options.json"))["studies"][0]["original_study"] == d.StudyInstanceUID
+# Reports and presentation states.
+for n, sop in enumerate(("1.2.840.10008.5.1.4.1.1.88.33", "1.2.840.10008.5.1.4.1.1.11.1")):
+    save(base(sop, 40 + n), f"options-{n}/a.dcm")
+    run("deidentify", f"options-{n}", "-o", f"options-{n}-out", rc=7)
+page = (pathlib.Path(__file__).resolve().parents[2] / "docs/pacs.md").read_text()
+named = re.findall(r"^\| .* \| (1131\d\d) \|", page, re.M)
+assert sorted(named) == [str(c) for c in range(113101, 113113)], named
+
 print(f"{len(tried)} attributes, at the top and within a sequence, two syntaxes")

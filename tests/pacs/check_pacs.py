@@ -1,6 +1,6 @@
 """send, fetch and receive against programs nobody here wrote: Orthanc, DCMTK's storescu and echoscu; then against peers that lie.
 usage: check_pacs.py PART BIN WORK, with PART orthanc, hostile, watch, doors, dicomweb, dicomweb_lies, tls or units"""
-import base64, contextlib, http.server, io, json, os, pathlib, shutil, signal, socket, ssl, struct, subprocess, sys, threading, time, urllib.parse, urllib.request, warnings
+import base64, contextlib, http.server, io, json, os, pathlib, re, shlex, shutil, signal, socket, ssl, struct, subprocess, sys, threading, time, urllib.parse, urllib.request, warnings
 
 if missing := [p for p in ("Orthanc", "storescu", "echoscu", "openssl") if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin")]:
     print(f"skipped: {', '.join(missing)} not installed (Debian: orthanc, dcmtk, openssl)")
@@ -1003,16 +1003,60 @@ def units():
         print("skipped: systemd-analyze not installed (Debian: systemd)")
         sys.exit(77)
     share = pathlib.Path(__file__).resolve().parents[2] / "apps" / "share"
-    for name in ("osteo-receive.service", "osteo-watch.service"):
-        text = (share / name).read_text()
-        assert "/usr/bin/osteo " in text
-        (work / name).write_text(text.replace("/usr/bin/osteo", str(osteo)))
-        r = run("systemd-analyze", "verify", "--man=no", work / name)
+    text = {}
+    for name in ("osteo-receive.service", "osteo-watch.service", "osteo-watch-orthanc@.service"):
+        text[name] = (share / name).read_text()
+        assert "/usr/bin/osteo " in text[name]
+        unit = work / name.replace("@", "@main")
+        unit.write_text(text[name].replace("/usr/bin/osteo", str(osteo)))
+        r = run("systemd-analyze", "verify", "--man=no", unit)
         assert r.stderr == "", r.stderr
         # What it calls is there.
-        called = next(line for line in text.splitlines() if line.startswith("ExecStart=")).split()
+        called = next(line for line in text[name].splitlines() if line.startswith("ExecStart=")).split()
         known = run(osteo, called[1], "--help").stdout
         assert all(flag in known for flag in called if flag.startswith("--")), called
+    # The worker of an Orthanc may do what the other may, and reach the network.
+    bounds = [{l for l in text[n].split("[Service]")[1].splitlines() if l and l[0] != "#" and l.split("=")[0] not in ("Environment", "EnvironmentFile", "ExecStart", "StateDirectory")}
+              for n in ("osteo-watch.service", "osteo-watch-orthanc@.service")]
+    assert bounds[0] - bounds[1] == {"PrivateNetwork=yes", "RestrictAddressFamilies=AF_UNIX"}, bounds[0] - bounds[1]
+    assert bounds[1] - bounds[0] == {"RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6"}, bounds[1] - bounds[0]
+
+    # Its line, as systemd makes it of the file that the unit tells of, asks that server with that login.
+    asked = []
+
+    class Server(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            asked.append((self.path, self.headers.get("Authorization")))
+            body = json.dumps({"Changes": [], "Done": True, "Last": 0}).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_):
+            pass
+
+    unit = text["osteo-watch-orthanc@.service"]
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Server) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        told = [l[1:].strip() for l in unit.splitlines() if re.match(r"#   OSTEO_", l)]  # the example of its head
+        assert [l.split("=")[0] for l in told] == ["OSTEO_ORTHANC", "OSTEO_ORTHANC_LOGIN", "OSTEO_RULES", "OSTEO_WATCH_FLAGS"], told
+        settings = dict(shlex.split(l)[0].split("=", 1) for l in told[:2])
+        settings |= {"OSTEO_ORTHANC": f"http://127.0.0.1:{server.server_port}", "OSTEO_WATCH_FLAGS": "--once --jobs 2",
+                     "OSTEO_RULES": str(share.parents[1] / "pipelines" / "rules.json")}
+        state = work / "state"
+        for folder in next(l for l in unit.splitlines() if l.startswith("StateDirectory=")).split("=")[1].split():
+            (state / folder.replace("osteo/", "").replace("osteo", "").replace("%i", "main")).mkdir(mode=0o700, parents=True, exist_ok=True)
+        line = next(l for l in unit.splitlines() if l.startswith("ExecStart=")).split("=", 1)[1]
+        words = []
+        for word in line.replace("/usr/bin/osteo", str(osteo)).replace("/var/lib/osteo", str(state)).replace("%i", "main").split():
+            words += settings[word[1:]].split() if re.fullmatch(r"\$\w+", word) else [re.sub(r"\$\{(\w+)\}", lambda m: settings[m[1]], word)]
+        r = subprocess.run(words, env=os.environ | settings, capture_output=True, text=True, timeout=120)
+        server.shutdown()
+    assert r.returncode == 0, r.stderr
+    login = "Basic " + base64.b64encode(b"USER:PASSWORD").decode()
+    assert any(path.startswith("/changes") and given == login for path, given in asked), asked
+    assert (state / "main-spool" / ".orthanc.json").is_file() and (state / "main-watch.prom").is_file() and (state / "main-cases").is_dir()
 
 
 {"orthanc": round_trip, "hostile": hostile, "watch": watch, "doors": doors, "dicomweb": dicomweb, "dicomweb_lies": dicomweb_lies, "tls": tls, "units": units}[part]()

@@ -41,7 +41,7 @@ as_user "osteo prepare ct.nrrd -o case --lower 500 --spacing-mm 1 --quiet"
 as_user "osteo rehearse case --headless --fast --script /usr/share/osteo/pipelines/sessions/mastoid.json -o session --quiet"
 as_user "osteo replay session"
 for f in /usr/share/man/man1/osteo-prepare.1.gz /usr/share/bash-completion/completions/osteo /usr/lib/udev/rules.d/70-osteotome.rules /usr/share/doc/osteo/osteo.spdx.json /usr/share/doc/osteo/copyright \
-  /usr/lib/systemd/system/osteo-receive.service /usr/lib/systemd/system/osteo-watch.service; do
+  /usr/lib/systemd/system/osteo-receive.service /usr/lib/systemd/system/osteo-watch.service /usr/lib/systemd/system/osteo-watch-orthanc@.service; do
   [ -s "$work/root$f" ] || [ -s "$work/root${f#/usr}" ] || { echo "$f is not there"; exit 1; }
 done
 install $(deb osteo-rehearse)
@@ -74,6 +74,7 @@ with osteo.Rehearsal(sys.argv[1]) as r:
 assert osteo.snapshot(surface).max() > 0
 print("python3-osteo:", len(surface.triangles), "triangles")
 PYTHON
+  [ -s "$work/root/usr/share/doc/python3-osteo/examples/drilled_hole.py" ] || { echo "no examples for Python"; exit 1; }
 fi
 if [ -n "$(deb osteo-full)" ]; then
   install $(deb osteo-full)

@@ -147,6 +147,12 @@ told(units(state % ("active", "disabled", "success")), unit, "care", "next start
 found = units("LoadState=not-found\\nActiveState=inactive")
 told(found, unit, "none", "not installed")
 told(found, "osteo-watch.service", "good", "runs")
+# Workers of Orthancs: each that systemd knows.
+fake("systemctl", "case \"$*\" in *list-units*) printf 'osteo-watch-orthanc@a.service loaded active running A\\nosteo-watch-orthanc@b.service loaded failed failed B\\n';; "
+     f"*@b*) printf '{state % ('failed', 'enabled', 'exit-code')}\\n';; *) printf '{state % ('active', 'enabled', 'success')}\\n';; esac\n")
+found = doctor(path=f"{fakes}:{os.environ['PATH']}")
+told(found, "osteo-watch-orthanc@a.service", "good", "runs")
+told(found, "osteo-watch-orthanc@b.service", "bad", "exit-code -> journalctl -u osteo-watch-orthanc@b.service")
 fake("systemctl", "echo 'System has not been booted with systemd' >&2; exit 1")
 found = doctor(path=str(fakes))
 told(found, "systemd", "none", "no systemd")

@@ -19,6 +19,10 @@ quietly cmake --build "$work/folder" --target one_library
 quietly "$work/folder/one_library"
 grep -q 'kappa 0.6970' "$work/said" || { cat "$work/said"; exit 1; }
 readelf -d "$(find "$work/folder/osteo" -name 'libosteo_statistics.so')" | grep -q 'SONAME.*\[libosteo_statistics.so.0.1\]' || { echo "the shared library's name says nothing of its version"; exit 1; }
+# What is ours is shown, what headers of others brought (Boost, Eigen, the standard library) is not.
+nm -D --defined-only "$(find "$work/folder/osteo" -name 'libosteo_statistics.so')" | awk '{print $3}' >"$work/shown"
+[ "$(grep -c '^_ZN5osteo' "$work/shown")" -gt 40 ] || { echo "the shared library hides what is ours"; exit 1; }
+! grep -v '^_Z[A-Z]*N*[A-Z]*5osteo' "$work/shown" || { echo "the shared library shows what is not ours"; exit 1; }
 refused "OSTEO_TESTS=OFF" cmake -S "$source/tests/setup/outside" -B "$work/tests-on" "${common[@]}" -DUSE=folder -DOSTEO_TREE="$source" -DOSTEO_TESTS=ON
 
 # As an archive: what would be committed, without what is built.

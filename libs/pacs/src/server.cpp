@@ -45,6 +45,7 @@ constexpr rlim_t kFewFiles = 256;               // free, of a file system that c
 constexpr int kSystemctlMs = 10'000;            // a manager that hangs
 constexpr std::size_t kMostSaid = 65'536;       // bytes of its answer
 constexpr std::array kUnits{"osteo-receive.service", "osteo-watch.service"};
+constexpr const char* kInstances = "osteo-watch-orthanc@";  // one for each Orthanc
 
 std::string reason() {
   return std::strerror(errno);
@@ -304,36 +305,48 @@ bool answer_of(std::vector<std::string> words, std::string& said) {
   return ended && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
+// False: systemd does not answer.
+bool check_unit(Findings& all, const std::string& unit) {
+  std::string said;
+  if (!answer_of({"systemctl", "show", "--property=LoadState,ActiveState,UnitFileState,Result", unit}, said)) return false;
+  const auto value = [&](const std::string& key) {
+    std::istringstream lines(said);
+    for (std::string line; std::getline(lines, line);)
+      if (line.starts_with(key + "=")) return line.substr(key.size() + 1);
+    return std::string();
+  };
+  const std::string active = value("ActiveState");
+  const bool starts = value("UnitFileState").starts_with("enabled");
+  if (value("LoadState") != "loaded")
+    all.push_back(
+        {unit, State::none, "not installed (" + value("LoadState") + ")", "it comes with the package osteo, for the prefix /usr"});
+  else if (active == "failed")
+    all.push_back({unit, State::bad, "has failed: " + value("Result"), "journalctl -u " + unit});
+  else if (active != "active" && active != "activating")
+    all.push_back({unit, State::care, "does not run (" + active + ")", "systemctl enable --now " + unit});
+  else if (active == "activating")
+    all.push_back({unit, State::care, "is being started, perhaps again and again", "journalctl -u " + unit});
+  else if (!starts)
+    all.push_back({unit, State::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
+  else
+    all.push_back({unit, State::good, "runs", {}});
+  return true;
+}
+
 void check_units(Findings& all) {
   for (const std::string unit : kUnits) {
-    std::string said;
-    if (!in_path("systemctl") || !answer_of({"systemctl", "show", "--property=LoadState,ActiveState,UnitFileState,Result", unit}, said)) {
+    if (!in_path("systemctl") || !check_unit(all, unit)) {
       all.push_back(
           {"systemd", State::none, "no systemd runs here", "start 'osteo receive' and 'osteo watch' by what starts services here"});
       return;
     }
-    const auto value = [&](const std::string& key) {
-      std::istringstream lines(said);
-      for (std::string line; std::getline(lines, line);)
-        if (line.starts_with(key + "=")) return line.substr(key.size() + 1);
-      return std::string();
-    };
-    const std::string active = value("ActiveState");
-    const bool starts = value("UnitFileState").starts_with("enabled");
-    if (value("LoadState") != "loaded")
-      all.push_back(
-          {unit, State::none, "not installed (" + value("LoadState") + ")", "it comes with the package osteo, for the prefix /usr"});
-    else if (active == "failed")
-      all.push_back({unit, State::bad, "has failed: " + value("Result"), "journalctl -u " + unit});
-    else if (active != "active" && active != "activating")
-      all.push_back({unit, State::care, "does not run (" + active + ")", "systemctl enable --now " + unit});
-    else if (active == "activating")
-      all.push_back({unit, State::care, "is being started, perhaps again and again", "journalctl -u " + unit});
-    else if (!starts)
-      all.push_back({unit, State::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
-    else
-      all.push_back({unit, State::good, "runs", {}});
   }
+  // Those that were started since the machine was, also if they have failed; that there is none is nothing to tell.
+  std::string said;
+  if (!answer_of({"systemctl", "list-units", "--all", "--plain", "--no-legend", kInstances + std::string("*")}, said)) return;
+  std::istringstream lines(said);
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with(kInstances)) static_cast<void>(check_unit(all, line.substr(0, line.find(' '))));
 }
 
 void check_cluster(Findings& all) {

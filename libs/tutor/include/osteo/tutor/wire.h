@@ -18,7 +18,7 @@ inline constexpr std::uint8_t kTutorProtocol = 3;
 inline constexpr std::size_t kMostPacketBytes = 1200;
 using Bytes = std::vector<std::uint8_t>;
 
-/// Where a packet comes from or goes to. IPv4 as IPv6 has it (::ffff:192.0.2.7).
+/// Where a packet comes from or goes to. IPv4 as IPv6 has it (mapped, RFC 4291).
 struct UdpPeer {
   std::array<std::uint8_t, 16> address{};
   std::uint32_t scope = 0;  ///< of an address that is one on each link

@@ -1,0 +1,199 @@
+#!/usr/bin/env python3
+"""The public headers as pages, by Doxygen, without network, and checked. apps/packaging/api.py OUT
+
+Grouped by component and library as libs/components.txt and docs/library.md have them. Every class, struct and enum of a public header must have a page,
+every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others."""
+import html.parser, os, pathlib, re, shutil, subprocess, sys, tempfile, urllib.parse
+import xml.etree.ElementTree
+
+root = pathlib.Path(__file__).resolve().parents[2]
+LOOK = pathlib.Path("/usr/share/doxygen-awesome-css")  # Debian's doxygen-awesome-css; without it Doxygen's own look
+DOXYFILE = root / "apps/packaging/Doxyfile"
+
+
+def rows(page, heading):
+    """Of the table in a page of docs/ whose first column is called so."""
+    lines = (root / page).read_text().splitlines()
+    at = next(i for i, l in enumerate(lines) if l.startswith(f"| {heading} |"))
+    for line in lines[at + 2:]:
+        if not line.startswith("|"):
+            return
+        yield [c.strip() for c in line.split("|")[1:-1]]
+
+
+def plain(text):
+    """A cell without links and backquotes: paths in it are of the repository."""
+    text = re.sub(r"\s*\(\[[^\]]*\]\([^)]*\)\)", "", text)
+    text = re.sub(r";?\s*\[[^\]]*\]\([^)]*\)", "", text)
+    return text.replace("`", "").replace("()", "")
+
+
+def groups():
+    """Components with what they hold, as Doxygen's groups."""
+    holds = {r[0]: plain(r[2]) for r in rows("docs/architecture.md", "library")}
+    libraries = [l.split()[0] for l in (root / "libs/layers.txt").read_text().splitlines() if l.strip() and l[0] != "#"]
+    of = {}
+    for line in (root / "libs/components.txt").read_text().splitlines():
+        if line.strip() and line[0] != "#":
+            name, held = line.split("|")
+            of[name.strip()] = held.split()
+    components = []  # name, what its example shows, its file, libraries
+    for name, _, example in rows("docs/library.md", "component"):
+        name = name.strip("`")
+        file, shows = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example).split(": ", 1)
+        components.append((name, shows, file, of.get(name, [name])))
+    placed = {l for *_, held in components for l in held}
+    components.append(("others", "", "", [l for l in libraries if l not in placed]))
+
+    text = ["// Made by apps/packaging/api.py.", "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library."]
+    for name, shows, file, held in components:
+        if name == "others":
+            text.append("/// @defgroup component_others Libraries by their own name\n"
+                        "/// What no component has is asked for by its own name: `find_package(osteo COMPONENTS base)`. "
+                        "But for `window`: that is the programs' own and not installed.")
+        else:
+            text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
+                        f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
+        text += [f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
+                 f"/// Target `osteo::{lib}`, headers `osteo/{lib}/`." for lib in held]
+    main = ["@mainpage The libraries of Osteotome", "",
+            "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/library.md:",
+            "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS import haptics)", "target_link_libraries(mine PRIVATE osteo::import osteo::haptics)",
+            "@endcode", "", "| component | libraries |", "|---|---|"]
+    for name, _, _, held in components:
+        shown = "by their own names" if name == "others" else name
+        main.append(f'| @ref component_{name} "{shown}" | ' + ", ".join(f"@ref lib_{l}" for l in held) + " |")
+    main += ["", "What a function may throw is osteo::Error, with the exit code of the programs and what to do about it. Values in osteo::Data do not change once "
+             "they are made, and are shared."]
+    text.append("\n".join(f"/// {l}".rstrip() for l in main))
+    return "\n\n".join(text) + "\n", components
+
+
+def stage(into):
+    """The headers, each in the group of its library: its first comment is what the file holds, what is in the namespace is in the group."""
+    for header in sorted(root.glob("libs/*/include/**/*.h")):
+        lib = header.relative_to(root / "libs").parts[0]
+        to = into / header.relative_to(root / "libs" / lib / "include")
+        lines = header.read_text().splitlines()
+        top = next((i for i, l in enumerate(lines) if not l.startswith("// ")), 0)
+        if top:
+            lines[:top] = [("/// @file\n" if i == 0 else "") + "/" + l for i, l in enumerate(lines[:top])]
+        for i, line in enumerate(lines):
+            if re.match(r"namespace osteo(::\w+)* \{$", line):
+                lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
+            elif re.match(r"\}  // namespace osteo(::\w+)*$", line):
+                lines[i] = "/** @} */\n" + line
+            elif m := re.match(r"/// @class (vtk\w+)", line):
+                lines[i] = f"{line}\n/// @ingroup lib_{lib}"
+        # Outside of `code`, <word> is no tag and #word no link.
+        for i, line in enumerate(lines):
+            code, slashes, said = line.partition("///")
+            if slashes:
+                said = re.sub(r"`[^`]*`|<(?=[A-Za-z]+[ >])|#(?=\w)", lambda m: m[0] if m[0][0] == "`" else "\\" + m[0], said)
+                lines[i] = code + slashes + said
+        to.parent.mkdir(parents=True, exist_ok=True)
+        to.write_text("\n".join(lines) + "\n")
+
+
+class Page(html.parser.HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.links, self.fetched, self.ids = [], [], set()
+
+    def handle_starttag(self, tag, attrs):
+        a = dict(attrs)
+        self.ids |= {a[k] for k in ("id", "name") if a.get(k)}
+        if tag == "a" and a.get("href"):
+            self.links.append(a["href"])
+        self.fetched += [a[k] for k in ("src", "data") if a.get(k)]
+        if tag == "link" and a.get("href"):
+            self.fetched.append(a["href"])
+
+
+def check(site, components):
+    bad, pages, links = [], {}, 0
+    for path in site.glob("*.html"):
+        pages[path.name] = page = Page()
+        page.feed(path.read_text())
+    for name, page in pages.items():
+        bad += [f"{name}: fetches {t}" for t in page.fetched if re.match(r"(https?:)?//", t)]
+        # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes.
+        for target in page.links + page.fetched:
+            file, _, anchor = target.partition("#")
+            if re.match(r"([a-z]+:|//)", target) or not target.strip("#"):
+                continue
+            links += 1
+            file = urllib.parse.unquote(file) or name
+            if not (site / file).exists():
+                bad.append(f"{name}: {target} leads nowhere")
+            elif anchor and anchor != "nested-classes" and file in pages and urllib.parse.unquote(anchor) not in pages[file].ids:
+                bad.append(f"{name}: {target}: no such anchor")
+    for css in site.rglob("*.css"):
+        if re.search(r"url\(['\"]?(https?:)?//", css.read_text(errors="replace")):
+            bad.append(f"{css.name}: fetches from elsewhere")
+    # What the headers declare, against what has a page or a place in one.
+    tags = xml.etree.ElementTree.parse(site / "osteo.tag").getroot()
+    known = {c.findtext("name").split("::")[-1].split("<")[0].strip() for c in tags.iter("compound") if c.get("kind") in ("class", "struct", "union")
+             and (site / (c.findtext("filename") or "")).is_file()}
+    known |= {m.findtext("name") for m in tags.iter("member") if m.get("kind") == "enumeration"}
+    grouped = {c.findtext("name"): c for c in tags.iter("compound") if c.get("kind") == "group"}
+    declared = 0
+    for header in root.glob("libs/*/include/**/*.h"):
+        for name in re.findall(r"^(?:class|struct|enum class|enum)\s+(\w+)[^;<]*?\{", header.read_text(), re.M):
+            declared += 1
+            if name not in known:
+                bad.append(f"{header.relative_to(root)}: {name} has no page")
+    for name, *_, held in components:
+        for group in [f"component_{name}", *(f"lib_{lib}" for lib in held)]:
+            if group not in grouped:
+                bad.append(f"no group {group}")
+        example = site / f"group__component__{name.replace('_', '__')}.html"
+        if name != "others" and example.exists() and 'class="fragment"' not in example.read_text():
+            bad.append(f"component {name}: its example is not shown")
+    return bad, len(pages), links, declared
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit("usage: apps/packaging/api.py OUT")
+    if shutil.which("doxygen") is None:
+        print("doxygen is not here: apt-get install --no-install-recommends doxygen doxygen-awesome-css", file=sys.stderr)
+        sys.exit(77)
+    out = pathlib.Path(sys.argv[1]).resolve()
+    if out.exists() and any(out.iterdir()) and not (out / "osteo.tag").exists():
+        sys.exit(f"{out} holds something else than these pages; give an empty folder")
+    with tempfile.TemporaryDirectory(prefix="osteo-api-") as work:
+        work = pathlib.Path(work)
+        stage(work / "include")
+        text, components = groups()
+        (work / "include/groups.dox").write_text(text)
+        version = re.search(r"project\(osteotome VERSION (\S+)", (root / "CMakeLists.txt").read_text())[1]
+        look = [LOOK / "doxygen-awesome.css", LOOK / "doxygen-awesome-sidebar-only.css"]
+        more = f"HTML_EXTRA_STYLESHEET = {' '.join(map(str, look))}\n" if all(p.exists() for p in look) else ""
+        (work / "Doxyfile").write_text(DOXYFILE.read_text() + f"""
+PROJECT_NUMBER = {version}
+INPUT = {work}/include
+STRIP_FROM_PATH = {work}/include
+STRIP_FROM_INC_PATH = {work}/include
+EXAMPLE_PATH = {root}/tests/setup/outside
+OUTPUT_DIRECTORY = {work}
+GENERATE_TAGFILE = {work}/html/osteo.tag
+WARN_LOGFILE = {work}/warnings
+{more}""")
+        (work / "html").mkdir()
+        said = subprocess.run(["doxygen", work / "Doxyfile"], capture_output=True, text=True, cwd=work, env={**os.environ, "LC_ALL": "C.UTF-8"})
+        if said.returncode:
+            sys.exit(said.stdout[-2000:] + said.stderr)
+        warned = [l.replace(f"{work}/include/", "") for l in (work / "warnings").read_text().splitlines() if l.strip()]
+        bad, pages, links, declared = check(work / "html", components)
+        if bad or warned:
+            sys.exit("\n".join([*warned[:40], *bad[:40], f"{len(warned)} warnings of Doxygen, {len(bad)} errors"]))
+        if out.exists():
+            shutil.rmtree(out)
+        shutil.copytree(work / "html", out)
+    print(f"{out}/index.html: {declared} classes, structs and enums, {len(components) - 1} components, {pages} pages, {links} links inside, none broken, "
+          "nothing fetched from elsewhere")
+
+
+if __name__ == "__main__":
+    main()
