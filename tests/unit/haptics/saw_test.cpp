@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numbers>
 
 #include "bar.h"
@@ -48,6 +49,7 @@ struct Cut {
     const BrickGrid& bone = world.bodies().front().body->bone;
     const double voxel = bone.frame().voxel_volume_mm3();
     double sum = 0, squares = 0;
+    std::map<VoxelKey, double> gone_of;
     seconds = 10.4 / mm_per_s;
     for (int t = 0; t < seconds * 1000; ++t) {
       const double t_s = t / 1000.0, z = 5.2 - mm_per_s * t_s;
@@ -57,12 +59,15 @@ struct Cut {
         removed_mm3 += gone;
         sum += gone * x;
         squares += gone * x * x;
-        if (c.before - c.density > 0.02F) farthest_mm = std::max(farthest_mm, std::abs(x));
+        gone_of[c.voxel] += gone / voxel;
       }
       const Vec3 tip = from_floats(step.record.device.position_mm) + from_floats(step.record.shown_offset_mm);
       if (t > 300) shown_off_mm = std::max(shown_off_mm, std::abs(tip.x - kGuide.at_mm.x));
       most_n = std::max(most_n, static_cast<double>(step.record.normal_force_n));
       records.push_back(step.record);
+    }
+    for (const auto& [name, gone] : gone_of) {
+      if (gone > 0.1) farthest_mm = std::max(farthest_mm, std::abs(place_of_voxel_mm(bone, name).x - kGuide.at_mm.x));
     }
     middle_mm = sum / removed_mm3;
     spread_mm = std::sqrt(squares / removed_mm3 - middle_mm * middle_mm);
@@ -85,9 +90,10 @@ DeviceSample unsteady(double t, double z) {
 TEST(HandSaw, CutsAStraightKerfByForceAndTime) {
   Cut c({}, steady);
   // The section is 10 x 8 mm, the blade 1 mm thick.
-  EXPECT_NEAR(c.removed_mm3 / 80, 1.0, 0.05);
+  EXPECT_NEAR(c.removed_mm3 / 80, 1.0, 0.03);
   EXPECT_NEAR(c.middle_mm, 0, 0.02);
   EXPECT_NEAR(c.spread_mm, 1 / std::sqrt(12.0), 0.05);
+  EXPECT_GT(c.farthest_mm, 0.4);
   EXPECT_LT(c.farthest_mm, 0.5 + 0.25);
   EXPECT_EQ(c.pieces(), 2U);
   for (const TickRecord& r : c.records) EXPECT_EQ(r.flags & kInSlot, 0U);
@@ -102,6 +108,7 @@ TEST(HandSaw, TheGuideMakesAnUnsteadyHandsCutAStraightOne) {
   EXPECT_NEAR(led.middle_mm, 0, 0.05);
   EXPECT_NEAR(led.spread_mm, 1 / std::sqrt(12.0), 0.06);
   EXPECT_LT(led.farthest_mm, 0.5 + 0.3);
+  EXPECT_GT(free.farthest_mm, 1.5);
   EXPECT_EQ(led.pieces(), 2U);
   // The blade is shown where it cuts, and the hand is pulled there.
   EXPECT_LT(led.shown_off_mm, 0.3);
