@@ -26,11 +26,15 @@ std::shared_ptr<const T[]> borrowed(const py::array& array) {
           }};
 }
 
-/// Memory of ours as a numpy array of this type that keeps it alive. No copy. Not to be written, unless `writable`.
-template <class Owner>
-py::array view_as(const py::dtype& type, Owner owner, const void* data, std::vector<py::ssize_t> shape, bool writable = false) {
+/// Memory of ours, of values of type T, as a numpy array of this type that keeps it alive. No copy. Not to be written, unless `writable`.
+template <class T, class Owner>
+py::array view_as(const py::dtype& type, Owner owner, const T* data, std::vector<py::ssize_t> shape, bool writable = false) {
   const py::capsule keep(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
-  py::array array(type, std::move(shape), data, keep);
+  // Strides are ours: pybind11 before 2.12 reads the size of an item where numpy 2 has something else.
+  std::vector<py::ssize_t> strides(shape.size());
+  auto step = static_cast<py::ssize_t>(sizeof(T));
+  for (std::size_t a = shape.size(); a-- > 0; step *= shape[a]) strides[a] = step;
+  py::array array(type, std::move(shape), std::move(strides), data, keep);
   if (!writable) py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   return array;
 }
