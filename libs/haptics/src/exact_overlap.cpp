@@ -8,9 +8,12 @@
 namespace osteo {
 namespace {
 
-RoundCone shell_of(RoundCone head, double spacing_mm) {
-  head.start_radius_mm += 0.5 * spacing_mm;
-  head.end_radius_mm += 0.5 * spacing_mm;
+// A saw with a shell as thick would rest on the shoulders of its own kerf; without any it would leave bone beside it: measured, a quarter.
+RoundCone shell_of(const Instrument& held, double spacing_mm) {
+  RoundCone head = held.head;
+  const double grow = (held.kind == InstrumentKind::saw ? 0.25 : 0.5) * spacing_mm;
+  head.start_radius_mm += grow;
+  head.end_radius_mm += grow;
   return head;
 }
 
@@ -21,7 +24,7 @@ const CutDepth& shell_depth(double spacing_mm, std::size_t tool) {
   const std::lock_guard lock(mutex);
   const auto key = std::pair(spacing_mm, tool);
   const auto it = known.find(key);
-  return it != known.end() ? it->second : known.try_emplace(key, shell_of(instrument_library()[tool].head, spacing_mm)).first->second;
+  return it != known.end() ? it->second : known.try_emplace(key, shell_of(instrument_library()[tool], spacing_mm)).first->second;
 }
 
 // With more voxels under the burr than may change in a tick, their rows take turns.
@@ -92,7 +95,7 @@ Cut ExactOverlap::cut(const BrickGrid&) noexcept {
 
 BurrProxy::BurrProxy(const ContactParams& params, double spacing_mm, std::span<const std::size_t> tools)
     : ContactModel(params), spacing_mm_(spacing_mm), shell_depths_(instrument_library().size()), overlap_(0), head_(spacing_mm) {
-  for (const Instrument& i : instrument_library()) shells_.push_back(shell_of(i.head, spacing_mm));
+  for (const Instrument& i : instrument_library()) shells_.push_back(shell_of(i, spacing_mm));
   for (std::size_t tool = 0; tool < shells_.size(); ++tool) {
     if (tools.empty() || std::find(tools.begin(), tools.end(), tool) != tools.end()) shell_depths_[tool] = &shell_depth(spacing_mm, tool);
   }

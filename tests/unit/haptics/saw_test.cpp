@@ -90,7 +90,7 @@ DeviceSample unsteady(double t, double z) {
 TEST(HandSaw, CutsAStraightKerfByForceAndTime) {
   Cut c({}, steady);
   // The section is 10 x 8 mm, the blade 1 mm thick.
-  EXPECT_NEAR(c.removed_mm3 / 80, 1.0, 0.03);
+  EXPECT_NEAR(c.removed_mm3 / 80, 1.0, 0.05);
   EXPECT_NEAR(c.middle_mm, 0, 0.02);
   EXPECT_NEAR(c.spread_mm, 1 / std::sqrt(12.0), 0.05);
   EXPECT_GT(c.farthest_mm, 0.4);
