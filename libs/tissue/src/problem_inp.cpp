@@ -378,7 +378,8 @@ Rigid rigid_ball(const RigidShape::Ball& ball) {
   return r;
 }
 
-// Contact pairs. Here each point of the surface is pushed by itself; there pressure grows with depth, by as much over the body's surface.
+// Contact pairs. Here each point of the surface is pushed by itself; there pressure grows with depth, by as much over what looks at the
+// thing.
 std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& contacts) {
   std::map<std::array<std::uint32_t, 3>, std::pair<std::size_t, std::size_t>> faces;  // element, face; those of two go
   for (std::size_t e = 0; e < body.tet_count(); ++e) {
@@ -388,24 +389,32 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
       if (!faces.try_emplace(face, e, f).second) faces.erase(face);
     }
   }
-  double area = 0;
-  std::vector<bool> on(body.point_count());
   std::string t = "*SURFACE, NAME=BODY, TYPE=ELEMENT\n";
-  const auto edge = [&](std::uint32_t a, std::uint32_t b) { return std::array{std::min(a, b), std::max(a, b)}; };
-  std::vector<std::array<std::uint32_t, 2>> edges;
-  for (const auto& [face, where] : faces) {
-    const Vec3 a = body.rest()[face[0]], b = body.rest()[face[1]], c = body.rest()[face[2]];
-    area += length(cross(b - a, c - a)) / 2;
-    for (std::size_t i = 0; i < 3; ++i) {
-      on[face[i]] = true;
-      edges.push_back(edge(face[i], face[(i + 1) % 3]));
+  for (const auto& [face, where] : faces) t += std::to_string(where.first + 1) + ", S" + std::to_string(where.second + 1) + "\n";
+  // Points over area of the faces that look at a thing (within 45 degrees); of all where none does.
+  const auto points_per_mm2 = [&](const auto& towards) {
+    for (const double least : {std::sqrt(0.5), -2.0}) {
+      double area = 0;
+      std::vector<std::array<std::uint32_t, 2>> points;  // corners twice the same, middles by their ends
+      for (const auto& [face, where] : faces) {
+        const auto& own = kFaces[where.second];
+        const auto at = [&](std::size_t i) { return body.rest()[body.nodes(where.first)[own[i]]]; };
+        const auto others = 6 - own[0] - own[1] - own[2];
+        Vec3 out = cross(at(1) - at(0), at(2) - at(0)) * 0.5;
+        if (dot(out, at(0) - body.rest()[body.nodes(where.first)[others]]) < 0) out = out * -1;
+        if (dot(out, towards((at(0) + at(1) + at(2)) / 3)) < least * length(out)) continue;
+        area += length(out);
+        for (std::size_t i = 0; i < 3; ++i) {
+          points.push_back({face[i], face[i]});
+          if (body.order() == TetOrder::t10) points.push_back({std::min(face[i], face[(i + 1) % 3]), std::max(face[i], face[(i + 1) % 3])});
+        }
+      }
+      std::sort(points.begin(), points.end());
+      points.erase(std::unique(points.begin(), points.end()), points.end());
+      if (area > 0) return static_cast<double>(points.size()) / area;
     }
-    t += std::to_string(where.first + 1) + ", S" + std::to_string(where.second + 1) + "\n";
-  }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  const auto points = static_cast<double>(std::count(on.begin(), on.end(), true)) +
-                      (body.order() == TetOrder::t10 ? static_cast<double>(edges.size()) : 0.0);
+    return 1.0;
+  };
   std::size_t node = body.point_count(), element = body.tet_count();
   int number = 0;
   for (const RigidContact& c : contacts) {
@@ -414,6 +423,8 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
     if (plane == nullptr && ball == nullptr)
       throw Error(ExitCode::usage, "only planes and balls are written to .inp as rigid things", "choose a load without other contacts");
     const Rigid r = plane != nullptr ? rigid_plane(*plane, body.rest()) : rigid_ball(ball->bounds());
+    const double density =
+        points_per_mm2([&](Vec3 at) { return plane != nullptr ? plane->normal() * -1 : normalized(ball->bounds().centre_mm - at); });
     const std::string name = std::to_string(++number);
     t += "*NODE, NSET=RIGID" + name + "\n";
     for (std::size_t p = 0; p < r.points.size(); ++p)
@@ -430,9 +441,9 @@ std::string contacts_text(const FemBody& body, const std::vector<RigidContact>& 
     t += surface;
     t += "*MATERIAL, NAME=RIGID" + name + "\n*ELASTIC\n1, 0\n*SOLID SECTION, ELSET=RIGID" + name + ", MATERIAL=RIGID" + name + "\n";
     t += "*BOUNDARY\nRIGID" + name + ", 1, 3\n";
-    t += "** " + field(c.stiffness_n_per_mm) + " N/mm of each point of the surface, spread over its area: MPa a mm of depth\n";
+    t += "** " + field(c.stiffness_n_per_mm) + " N/mm of each point that looks at it, spread over their area: MPa a mm of depth\n";
     t += "*SURFACE INTERACTION, NAME=PUSH" + name + "\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n" +
-         field(c.stiffness_n_per_mm * points / area) + "\n";
+         field(c.stiffness_n_per_mm * density) + "\n";
     t += "*CONTACT PAIR, INTERACTION=PUSH" + name + ", TYPE=SURFACE TO SURFACE\nBODY, THING" + name + "\n";
   }
   return t;

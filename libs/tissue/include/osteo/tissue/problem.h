@@ -48,7 +48,7 @@ struct TissueProblem {
 /// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and
 /// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Contact with planes (one triangle) and balls
 /// (5120, off by 0.1 % of the radius) is a *CONTACT PAIR, surface to surface, against tetrahedra that are held; its pressure grows with
-/// depth by stiffness_n_per_mm times points over area of the body's surface. There faces are pushed, here points: the same for a plane but
+/// depth by stiffness_n_per_mm times points over area of what looks at it. There faces are pushed, here points: the same for a plane but
 /// for the depth that is left, and for a ball as far as the mesh resolves what it touches. Not read back. Error(usage) for neo_hooke,
 /// corotated and t4_mean, which are not known there, and for rigid things of another shape.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
