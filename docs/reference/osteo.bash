@@ -2,7 +2,7 @@
 _osteo() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}
   if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin bone-stiffness fem calibrate simulate saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare batch report approve edit hand-over take-back scene plan rehearse replay playback tutor join score movie review export sound heat monitor stream console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen deidentify send fetch receive watch doctor demo bench docs help --version" -- "$cur"))
+    COMPREPLY=($(compgen -W "import import-bone crop denoise reduce-metal threshold apply-edits resample surface mesh-info mesh-repair compare distance distance-at voxelize tetrahedralize skin bone-stiffness fem calibrate simulate fit-damping saw pieces curve snapshot structures tube find-structures register phantom list info series guide convert run prepare batch report approve edit hand-over take-back scene plan rehearse replay playback tutor join score movie review export sound heat monitor stream console experiment ground-truth study simulate-trainee devices markers calibrate-camera calibrate-pen track-pen deidentify send fetch receive watch doctor demo bench docs help --version" -- "$cur"))
     return
   fi
   case "${COMP_WORDS[1]} $prev" in
@@ -23,6 +23,7 @@ _osteo() {
     "calibrate --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split corotated " -- "$cur")); return ;;
     "calibrate --order") COMPREPLY=($(compgen -W "auto t4 t10 t4_mean " -- "$cur")); return ;;
     "simulate --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
+    "fit-damping --method") COMPREPLY=($(compgen -W "explicit implicit " -- "$cur")); return ;;
     "pieces --connectivity") COMPREPLY=($(compgen -W "face full " -- "$cur")); return ;;
     "snapshot --view") COMPREPLY=($(compgen -W "left_front left right front back above below " -- "$cur")); return ;;
     "tube --kind") COMPREPLY=($(compgen -W "nerve vessel " -- "$cur")); return ;;
@@ -76,6 +77,7 @@ _osteo() {
     fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out --nodes-out" ;;
     calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --deformed-out --map-out --course-out" ;;
     simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;
+    fit-damping) flags="$flags --xml --describe --load --at-mm --along --method --step-ms --density-kg-m3 --fit-stiffness --release-s --fit-release --constants --fitted-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;
     pieces) flags="$flags --xml --describe --least-mm3 --connectivity --apart-mm --keep --surface-out --kept-out" ;;
     curve) flags="$flags --xml --describe --stiffness-n-per-mm --max-force-n --arc-penalty --engage-mm --release-mm" ;;

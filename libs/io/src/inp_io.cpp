@@ -131,7 +131,10 @@ class Parser {
     const bool ten = kind == "C3D10" || kind == "C3D10H" || kind == "C3D10M" || kind == "C3D10T";
     if (!ten && kind != "C3D4" && kind != "C3D4H")
       throw fail(card, "elements of type " + (kind.empty() ? "?" : kind) + " are not read", "C3D4 and C3D10 are");
-    if (!elements_.empty() && ten != file_.quadratic) throw fail(card, "linear and quadratic elements are mixed");
+    if (!elements_.empty() && ten != file_.quadratic)
+      throw fail(card, "linear and quadratic elements are mixed",
+                 "rigid things of a contact, as fem --inp-out writes them, are not read back: give fem the mesh and the problem that they "
+                 "came from");
     file_.quadratic = ten;
     for (const auto& row : card.rows) {
       if (row.size() != (ten ? 11U : 5U))

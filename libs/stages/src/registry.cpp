@@ -6,6 +6,7 @@
 #include "osteo/stages/distance.h"
 #include "osteo/stages/edit.h"
 #include "osteo/stages/enhance.h"
+#include "osteo/stages/fit_damping.h"
 #include "osteo/stages/image.h"
 #include "osteo/stages/import.h"
 #include "osteo/stages/mesh.h"
@@ -39,6 +40,7 @@ Registry osteo_stages() {
   registry.add<FemStage>();
   registry.add<CalibrateStage>();
   registry.add<SimulateStage>();
+  registry.add<FitDampingStage>();
   registry.add<SawStage>();
   registry.add<PiecesStage>();
   registry.add<CurveStage>();

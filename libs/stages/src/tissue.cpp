@@ -34,7 +34,8 @@ StageInfo FemStage::info() {
                {"report", {DataKind::document}, "displacements, energy, reaction, iterations, in JSON", true},
                {"inp",
                 {DataKind::document},
-                "the problem for CalculiX or Abaqus (not neo_hooke, corotated or t4_mean, which are not known there, and no contacts)",
+                "the problem for CalculiX or Abaqus (not neo_hooke, corotated or t4_mean, which are not known there); contacts as contact "
+                "pairs",
                 true},
                {"nodes", {DataKind::document}, "all nodes in double precision, middles of edges too, with displacement_mm (.vtu)", true}},
           .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 5.3",
@@ -80,14 +81,12 @@ std::vector<Data> FemStage::run(const Params& p, std::span<const Data> inputs, c
   context.progress(1);
   Document inp;
   const bool known = elements.law != ElasticLaw::neo_hooke && elements.law != ElasticLaw::corotated && elements.order != TetOrder::t4_mean;
-  if (known && load.contacts.empty()) {
+  if (known) {
     inp.json = inp_text(body, load);
   } else {
     // Whoever asked for the file finds in it why it holds no problem.
-    inp.json = "** osteotome wrote no problem: CalculiX and Abaqus know no " +
-               (known ? std::string("contact with rigid things as it is here")
-                      : std::string(name_of(elements.law)) + " with " + std::string(name_of(elements.order))) +
-               "; give --law linear, stvk or neo_hooke_split, --order t4 or t10, and a load without contacts\n";
+    inp.json = "** osteotome wrote no problem: CalculiX and Abaqus know no " + std::string(name_of(elements.law)) + " with " +
+               std::string(name_of(elements.order)) + "; give --law linear, stvk or neo_hooke_split, --order t4 or t10\n";
   }
   return {moved_mesh(mesh, corners), Document{written(j)}, std::move(inp), Document{nodes_vtu(body, r.points_mm)}};
 }

@@ -336,6 +336,11 @@ std::vector<Vec3> TissueDynamics<Real>::positions_mm() const {
 }
 
 template <class Real>
+Vec3 TissueDynamics<Real>::position_mm(std::uint32_t point) const {
+  return impl_->at(point);
+}
+
+template <class Real>
 double TissueDynamics<Real>::residual() const {
   Impl& m = *impl_;
   m.forces();

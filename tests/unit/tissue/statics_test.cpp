@@ -196,6 +196,73 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
   }
 }
 
+// Contact pairs push faces where we push points: the same against a plane but for the depth that is left, and against a ball as far as the
+// mesh resolves what it touches.
+TEST(Statics, ContactAgreesWithCalculix) {
+  if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
+  const Column c;
+  const std::string press = R"("surfaces": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "kpa": [0, 0, 2]}])";
+  struct Case {
+    std::string load;
+    ElasticLaw law;
+    TetOrder order;
+    double bound;
+  };
+  const std::string plane = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -2], "stiffness_n_per_mm": 100}]})",
+                    side = R"({"contacts": [{"at_mm": [19, 0, 60], "normal": [-1, 0, -0.2], "stiffness_n_per_mm": 100}]})",
+                    ball = R"({"contacts": [{"at_mm": [10, 10, 118], "radius_mm": 60, "stiffness_n_per_mm": 100}]})",
+                    soft = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 0.2}]})",
+                    both = "{" + press + R"(, "contacts": [{"at_mm": [0, 0, 60.5], "normal": [0, 0, -1], "stiffness_n_per_mm": 100},
+                                                          {"at_mm": [79.5, 10, 30], "radius_mm": 60, "stiffness_n_per_mm": 100}]})";
+  for (const Case& k : {Case{plane, ElasticLaw::linear, TetOrder::t4, 2e-3},
+                        {plane, ElasticLaw::linear, TetOrder::t10, 5e-4},
+                        {plane, ElasticLaw::stvk, TetOrder::t10, 5e-4},
+                        {soft, ElasticLaw::linear, TetOrder::t10, 0.045},
+                        {soft, ElasticLaw::linear, TetOrder::t4, 0.045},
+                        {side, ElasticLaw::linear, TetOrder::t10, 0.06},
+                        {ball, ElasticLaw::linear, TetOrder::t10, 0.06},
+                        {ball, ElasticLaw::linear, TetOrder::t4, 0.2},
+                        {both, ElasticLaw::linear, TetOrder::t10, 0.08}}) {
+    const TissueProblem p = problem_of(k.load, c.mesh);
+    const FemBody body(points_of(c.mesh), tets_of(c.mesh), p.materials, k.law, k.order);
+    const TissueLoad all = body.on_all_points(p.loads[0]);
+    const Statics ours = statics(body, all);
+    ASSERT_TRUE(ours.converged) << ours.why;
+    const std::vector<Vec3> u = by_calculix(inp_text(body, all), body.point_count());
+    ASSERT_EQ(u.size(), body.point_count()) << k.load;
+    double off = 0, sum = 0;
+    for (std::size_t q = 0; q < u.size(); ++q) {
+      const Vec3 own = ours.points_mm[q] - body.rest()[q];
+      off += dot(u[q] - own, u[q] - own);
+      sum += dot(u[q], u[q]);
+    }
+    std::printf("contact, order %d, law %d: %.2e off CalculiX\n", static_cast<int>(k.order), static_cast<int>(k.law), std::sqrt(off / sum));
+    EXPECT_LT(std::sqrt(off / sum), k.bound) << k.load;
+  }
+}
+
+TEST(Statics, ContactThatAnInpFileCannotHold) {
+  class Cylinder final : public RigidShape {
+   public:
+    [[nodiscard]] Ball bounds() const override { return {{}, 1e300}; }
+    double distance_mm(Vec3 at, Vec3& outwards) const override {
+      outwards = normalized(Vec3{at.x, at.y, 0});
+      return std::hypot(at.x, at.y) - 1;
+    }
+  };
+  const Column c;
+  const TissueProblem p = problem_of(R"({"gravity_m_s2": [0, 0, -9.81]})", c.mesh);
+  const FemBody body(points_of(c.mesh), tets_of(c.mesh), p.materials, ElasticLaw::linear, TetOrder::t4);
+  TissueLoad load = p.loads[0];
+  load.contacts.push_back({std::make_shared<Cylinder>(), 1});
+  try {
+    (void)inp_text(body, load);
+    ADD_FAILURE();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("only planes and balls"), std::string::npos) << e.what();
+  }
+}
+
 TEST(Statics, GravityOfAnInpFile) {
   const Column c;
   const TissueProblem weight = problem_of(R"({"gravity_m_s2": [0, 0, -9.81]})", c.mesh);

@@ -61,6 +61,7 @@ class TissueDynamics {
   /// Triangles and points that the tool met in the last step.
   [[nodiscard]] int met_by_tool() const;
   [[nodiscard]] std::vector<Vec3> positions_mm() const;
+  [[nodiscard]] Vec3 position_mm(std::uint32_t point) const;
   [[nodiscard]] std::size_t point_count() const;
   /// Largest unbalanced force on a free point over the largest load (or 1 N): at rest when small and kinetic energy is too.
   [[nodiscard]] double residual() const;

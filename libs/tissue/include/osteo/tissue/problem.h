@@ -46,8 +46,11 @@ struct TissueProblem {
 /// Without `needs_loads` there may be none.
 [[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true);
 /// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and
-/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Error(usage) for neo_hooke, corotated and
-/// t4_mean, which are not known there.
+/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Contact with planes (one triangle) and balls
+/// (5120, off by 0.1 % of the radius) is a *CONTACT PAIR, surface to surface, against tetrahedra that are held; its pressure grows with
+/// depth by stiffness_n_per_mm times points over area of what looks at it. There faces are pushed, here points: the same for a plane but
+/// for the depth that is left, and for a ball as far as the mesh resolves what it touches. Not read back. Error(usage) for neo_hooke,
+/// corotated and t4_mean, which are not known there, and for rigid things of another shape.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 /// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
 /// Constants that were learnt without the regions ("base") stand on one material.
