@@ -136,6 +136,48 @@ TEST(RehearsalControl, ZTakesBackTheLastStrokeAndThenTheCut) {
   sitting.running->stop();
 }
 
+TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  ASSERT_TRUE(control.begin(true, false));
+  press(control, Command::saw);
+  SawCut cut = control.tools().cut();
+  cut.at_mm = {8, 0, 0};
+  control.tools().set_cut(cut);
+  control.tools().take_saw(control.rehearsal());
+  EXPECT_TRUE(control.tools().saw_in_hand());
+  EXPECT_EQ(control.tools().tool(), HandTools::Tool::drill) << "the hand moves it";
+  const auto saw = static_cast<std::uint8_t>(instrument_index("saw 25 mm"));
+  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.tool == saw && !control.leading(); }));
+  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }), (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 3}));
+  // A hand beside the plane cuts in it.
+  control.move_hand({9.5, 0, 8});
+  ASSERT_TRUE(frames_until(control, [&] { return (control.rehearsal().latest().flags & kInSlot) != 0; }));
+  control.move_hand({9.5, 0, 3.5});
+  HandInput runs;
+  runs.pressed = runs.on_bone = true;
+  ASSERT_TRUE(frames_until(
+      control, [&] { return control.rehearsal().removed_mm3() > 0.2; }, runs));
+  const TickRecord tick = control.rehearsal().latest();
+  EXPECT_NEAR(tick.device.position_mm[0] + tick.shown_offset_mm[0], 8, 0.3);
+  EXPECT_LT(tick.force_n[0], 0) << "the hand is pulled to the plane";
+  // The guide's plane is what the mouse turns the handle into.
+  EXPECT_NEAR(tick.device.axis[0], 0, 0.02);
+  // A burr puts it away, and takes the guide off; so does its own key.
+  control.move_hand({9.5, 0, 20});
+  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.position_mm[2] > 15; }));
+  press(control, Command::diamond);
+  EXPECT_FALSE(control.tools().saw_in_hand());
+  ASSERT_TRUE(frames_until(control, [&] { return !of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
+  ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.tool == burr_index(BurrKind::diamond, 4); }));
+  control.tools().take_saw(control.rehearsal());
+  press(control, Command::saw);
+  EXPECT_FALSE(control.tools().saw_in_hand());
+  EXPECT_EQ(control.tools().tool(), HandTools::Tool::drill);
+  sitting.running->stop();
+}
+
 TEST(RehearsalControl, KeysChooseTheBurrAndLatchTheDrill) {
   Sitting sitting;
   RehearsalControl control = sitting.control();
