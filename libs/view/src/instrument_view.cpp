@@ -98,7 +98,9 @@ void InstrumentView::show(const TickRecord& tick, double rate_hz, const std::fun
   const Vec3 axis = tool_axis(tick, guide), hand = from_floats(tick.device.position_mm);
   const Vec3 off = from_floats(tick.shown_offset_mm);
   // At the bone's surface, not in it, however far the hand has sunk in.
-  const RigidTransform pose{frame_of_axis(axis), hand + off};
+  RigidTransform pose{frame_of_axis(axis), hand + off};
+  // A blade lies flat in its guide; the hand does not tell how it is turned otherwise.
+  if ((tick.flags & kInSlot) != 0 && guide.on()) pose.rotation = {{guide.normal, cross(axis, guide.normal), axis}};
   if (const Burr* const burr = held.as_burr()) {
     const double seconds = m.tick && tick.tick > *m.tick ? static_cast<double>(tick.tick - *m.tick) / rate_hz : 0;
     if (seconds > 0) m.spin.turn(static_cast<double>(tick.speed_rpm), seconds, flutes_of(*burr));

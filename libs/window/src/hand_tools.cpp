@@ -69,6 +69,10 @@ void HandTools::take_saw(Rehearsal& rehearsal) {
   note_ = "saw in the hand, held in its plane: " + key_name(Command::bring) + " brings it, " + key_name(Command::saw) + " puts it away";
 }
 
+void HandTools::loosen_saw(bool loose, Rehearsal& rehearsal) {
+  if (saw_in_hand_) rehearsal.act(SceneAction::cutting_guide(loose ? CuttingGuide{} : guide()));
+}
+
 void HandTools::put_saw_away(Rehearsal& rehearsal) {
   if (!saw_in_hand_) return;
   saw_in_hand_ = false;

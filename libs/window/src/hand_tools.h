@@ -39,6 +39,8 @@ class HandTools {
   /// The saw into the hand, where the blade's plane becomes a cutting guide; what it cuts then is by force and time, as with a burr.
   void take_saw(Rehearsal& rehearsal);
   void put_saw_away(Rehearsal& rehearsal);
+  /// While the hand is led somewhere the guide does not hold its saw.
+  void loosen_saw(bool loose, Rehearsal& rehearsal);
   [[nodiscard]] bool saw_in_hand() const { return saw_in_hand_; }
   [[nodiscard]] CuttingGuide guide() const { return {cut_.at_mm, normalized(cut_.normal), kGuideMm}; }
 

@@ -199,6 +199,7 @@ void RehearsalControl::lead(std::optional<Vec3> seen_mm, Vec3 forward) {
     return;
   }
   leading_ = Leading{Leading::Stage::letting_go, {}, seen_mm, forward, {}};
+  tools_.loosen_saw(true, rehearsal());
   // Pulled aside it would not get there.
   if (lead_pause_.begin()) say("the drill finds its way: your hand is let go until it is there");
   latched_ = false;
@@ -234,6 +235,7 @@ void RehearsalControl::go_on_leading() {
   Device& device = rehearsal().device();
   const Led led = device.led();
   if (led == Led::on_the_way) return;
+  const std::string drill = tools_.saw_in_hand() ? "saw" : "drill";
   const auto go = [&](Leading::Stage stage, const HandWay& way, const HandPose& end) {
     leading_->stage = stage;
     goal_.position_mm = end.at_mm;
@@ -253,7 +255,7 @@ void RehearsalControl::go_on_leading() {
     if (leading_->seen_mm) {
       const FreeWays::Found a = ways.approach(from, *leading_->seen_mm, leading_->forward, wanted_axis());
       const double gap = length(a.end.at_mm - *leading_->seen_mm) - burr().diameter_mm / 2;
-      const std::string what = plate_in_hand() ? "plate" : "drill";
+      const std::string what = plate_in_hand() ? "plate" : drill;
       char far[80];
       std::snprintf(far, sizeof far, "the %s gets no nearer than %.0f mm this way", what.c_str(), gap);
       leading_->done = a.way.put ? "the " + what + " was shut in; it was taken out and set down there"
@@ -264,12 +266,12 @@ void RehearsalControl::go_on_leading() {
     } else {
       const HandPose to = waiting(ways);
       const FreeWays::Found out = ways.way(from, to);
-      leading_->done = out.way.put ? "the drill was shut in; it was taken out" : "drill lifted out";
+      leading_->done = out.way.put ? "the " + drill + " was shut in; it was taken out" : drill + " lifted out";
       if (out.past_structures) leading_->done += kPastStructures;
       go(Leading::Stage::on_the_way, out.way, to);
     }
   } else if (led == Led::blocked && leading_->stage == Leading::Stage::on_the_way) {
-    leading_->done = "the drill was stuck; it was taken out";
+    leading_->done = "the " + drill + " was stuck; it was taken out";
     const HandPose to = waiting(free_ways(true));
     HandWay way;
     way.put = true;
@@ -282,6 +284,7 @@ void RehearsalControl::go_on_leading() {
     const std::string how = leading_->seen_mm ? std::string() : tools_.how();
     say((how.empty() ? leading_->done : how) + (lead_pause_.end() ? "; your hand is led again" : ""));
     leading_.reset();
+    tools_.loosen_saw(false, rehearsal());
   }
 }
 

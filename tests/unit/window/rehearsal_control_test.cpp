@@ -164,6 +164,11 @@ TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
   EXPECT_LT(tick.force_n[0], 0) << "the hand is pulled to the plane";
   // The guide's plane is what the mouse turns the handle into.
   EXPECT_NEAR(tick.device.axis[0], 0, 0.02);
+  // Led away, it is let go of until it is there.
+  press(control, Command::lift);
+  ASSERT_TRUE(frames_until(control, [&] { return !control.leading(); }));
+  EXPECT_EQ(control.message(), "saw lifted out");
+  ASSERT_TRUE(frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
   // A burr puts it away, and takes the guide off; so does its own key.
   control.move_hand({9.5, 0, 20});
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.position_mm[2] > 15; }));
