@@ -81,7 +81,7 @@ class MovieReader final : public Reader {
     draw_until(record.tick);
     scene_.tick(record, changes);
     if (record.tick % 512 == 0) context_.check_cancelled();
-    hardest_n_ = std::max(hardest_n_, static_cast<double>(record.normal_force_n));
+    if (record.tick >= first_told_) hardest_n_ = std::max(hardest_n_, static_cast<double>(record.normal_force_n));
     told_tick_ = std::max(told_tick_, record.tick + 1);
   }
   /// The rest of the frames show the scene as it was left.
@@ -142,6 +142,10 @@ class MovieReader final : public Reader {
   const Context& context_;
   std::size_t next_ = 0;
   std::uint64_t told_tick_ = 0;
+  // What lies before the movie is stepped through, but the first frame tells of its own time alone.
+  const std::uint64_t first_told_ = times_.ticks.size() < 2
+                                        ? times_.ticks.front()
+                                        : times_.ticks.front() - std::min(times_.ticks.front(), times_.ticks[1] - times_.ticks[0]);
   double hardest_n_ = 0;  // since the frame before
   bool ended_ = false;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();

@@ -110,6 +110,27 @@ TEST(MovieTimes, IdleTimeIsLeftOutButForItsEdges) {
   EXPECT_NEAR(movie_times(survey_with_idle(100, 0, 100), 0, -1, 1, 10, true).shown_s, 2 * kRestS, 1e-9);
 }
 
+// A movie of a part says of its first picture what the whole one says of it: not the force of what came before.
+TEST(Movie, APartTellsNothingOfWhatCameBefore) {
+  const test::ScratchFolder scratch;
+  record(scratch / "s.oss", {kFromAbove});
+  const SessionReader session(scratch / "s.oss");
+  MovieOptions o = small();
+  o.overlay = true;
+  o.width = 640;
+  o.height = 480;
+  o.to_s = 2.6;
+  (void)make_movie(session, block(), {}, o, scratch / "whole.mp4");
+  o.from_s = 2;
+  (void)make_movie(session, block(), {}, o, scratch / "part.mp4");
+  const std::vector<cv::Mat> whole = frames_of(scratch / "whole.mp4"), part = frames_of(scratch / "part.mp4");
+  ASSERT_EQ(whole.size(), 13U);
+  ASSERT_EQ(part.size(), 3U);
+  const cv::Rect strip(0, 440, 640, 40);
+  EXPECT_LT(difference(whole[10](strip), part[0](strip)), 1.0);
+  EXPECT_GT(difference(whole[4](strip), part[0](strip)), 1.0) << "while drilling it says something else";
+}
+
 TEST(Movie, ShowsTheHoleAtItsEndFromWhereTheSurgeonLooked) {
   const test::ScratchFolder scratch;
   record(scratch / "s.oss", {kFromAbove});
