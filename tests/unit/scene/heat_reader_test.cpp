@@ -97,6 +97,33 @@ TEST(HeatReader, IsInBalanceAndTheSameInAReplay) {
   EXPECT_EQ(steel.live, steel.again);
 }
 
+// Twice its stroke of 3 mm for every fourth turn, along the blade where there is bone at it.
+TEST(HeatReader, ASawHeatsAlongItsBlade) {
+  const World world(test::bar(0.5, 0.2));
+  const HeatOfCutting params;
+  HeatReader heat(world, nullptr, 1000, params);
+  heat.resync(world);
+  TickRecord t;
+  t.device.tool = static_cast<std::uint8_t>(instrument_index("saw 25 mm"));
+  // On the bar's upper face: its tip in the middle, its last fifth beyond the bar's end.
+  t.device.position_mm = {-5, 0, 4.4F};
+  t.device.axis = {1, 0, 0};
+  t.device.pedal = 255;
+  t.speed_rpm = 60000;
+  t.normal_force_n = 4;
+  t.force_n = {0, 0, 4};
+  for (; t.tick < 1000; ++t.tick) heat.tick(t, {});
+  const double metres = 2 * 0.003 * 60000 / 4 / 60;  // in the second
+  EXPECT_NEAR(heat.ledger().added_j, params.cutting_share * 4 * metres, 1e-9);
+  for (const double x : {-5.0, 0.0, 5.0, 10.0}) EXPECT_GT(heat.celsius_at({x, 0, 3.5}), 37.5) << x;
+  EXPECT_LT(heat.celsius_at({-12, 0, 3.5}), 37.5) << "ahead of the tip";
+  // At rest it heats nothing.
+  t.speed_rpm = 0;
+  const double before = heat.ledger().added_j;
+  for (; t.tick < 1100; ++t.tick) heat.tick(t, {});
+  EXPECT_EQ(heat.ledger().added_j, before);
+}
+
 TEST(HeatReader, ABurrThatStandsHeatsNothing) {
   const Drilled idle = run(false, {}, 0);
   EXPECT_EQ(idle.live.added_j, 0);

@@ -163,6 +163,18 @@ TEST(SoundTracker, HearsHandsActionsAndStructures) {
   EXPECT_EQ(t.state().metal_n, 3);
 }
 
+TEST(SoundTracker, ASawIsHeardAtItsStrokes) {
+  SoundTracker t({}, 1000, true);
+  TickRecord saw;
+  saw.device.tool = static_cast<std::uint8_t>(instrument_index("saw 25 mm"));
+  saw.speed_rpm = 60000;
+  saw.normal_force_n = 2;
+  t.take(saw);
+  EXPECT_EQ(t.state().voices[0].kind, SoundKind::cutting);
+  EXPECT_EQ(t.state().voices[0].speed_rpm, 15000);
+  EXPECT_EQ(t.state().voices[0].press_n, 2);
+}
+
 TEST(SoundTracker, HearsInstrumentsTouch) {
   SoundTracker t({}, 1000, true);
   TickRecord drill, sucker;
