@@ -3,8 +3,10 @@
 
 Grouped by component and library as libs/components.txt and docs/library.md have them. Every class, struct and enum of a public header must have a page,
 every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others."""
-import html.parser, os, pathlib, re, shutil, subprocess, sys, tempfile, urllib.parse
+import os, pathlib, re, shutil, subprocess, sys, tempfile
 import xml.etree.ElementTree
+
+from html_pages import check_pages
 
 root = pathlib.Path(__file__).resolve().parents[2]
 LOOK = pathlib.Path("/usr/share/doxygen-awesome-css")  # Debian's doxygen-awesome-css; without it Doxygen's own look
@@ -95,42 +97,9 @@ def stage(into):
         to.write_text("\n".join(lines) + "\n")
 
 
-class Page(html.parser.HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.links, self.fetched, self.ids = [], [], set()
-
-    def handle_starttag(self, tag, attrs):
-        a = dict(attrs)
-        self.ids |= {a[k] for k in ("id", "name") if a.get(k)}
-        if tag == "a" and a.get("href"):
-            self.links.append(a["href"])
-        self.fetched += [a[k] for k in ("src", "data") if a.get(k)]
-        if tag == "link" and a.get("href"):
-            self.fetched.append(a["href"])
-
-
 def check(site, components):
-    bad, pages, links = [], {}, 0
-    for path in site.glob("*.html"):
-        pages[path.name] = page = Page()
-        page.feed(path.read_text())
-    for name, page in pages.items():
-        bad += [f"{name}: fetches {t}" for t in page.fetched if re.match(r"(https?:)?//", t)]
-        # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes.
-        for target in page.links + page.fetched:
-            file, _, anchor = target.partition("#")
-            if re.match(r"([a-z]+:|//)", target) or not target.strip("#"):
-                continue
-            links += 1
-            file = urllib.parse.unquote(file) or name
-            if not (site / file).exists():
-                bad.append(f"{name}: {target} leads nowhere")
-            elif anchor and anchor != "nested-classes" and file in pages and urllib.parse.unquote(anchor) not in pages[file].ids:
-                bad.append(f"{name}: {target}: no such anchor")
-    for css in site.rglob("*.css"):
-        if re.search(r"url\(['\"]?(https?:)?//", css.read_text(errors="replace")):
-            bad.append(f"{css.name}: fetches from elsewhere")
+    # Of a class whose only inner one is private Doxygen links a list that it then leaves out: nested-classes.
+    bad, pages, links = check_pages(site, lambda _, target, lost: not lost and target.endswith("#nested-classes"))
     # What the headers declare, against what has a page or a place in one.
     tags = xml.etree.ElementTree.parse(site / "osteo.tag").getroot()
     known = {c.findtext("name").split("::")[-1].split("<")[0].strip() for c in tags.iter("compound") if c.get("kind") in ("class", "struct", "union")
@@ -150,7 +119,7 @@ def check(site, components):
         example = site / f"group__component__{name.replace('_', '__')}.html"
         if name != "others" and example.exists() and 'class="fragment"' not in example.read_text():
             bad.append(f"component {name}: its example is not shown")
-    return bad, len(pages), links, declared
+    return bad, pages, links, declared
 
 
 def main():

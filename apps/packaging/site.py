@@ -2,7 +2,9 @@
 """Builds the pages of docs/ as a site by mkdocs, without network, and checks it. apps/packaging/site.py OUT
 
 Every page must be reachable from the navigation, every link and anchor must lead somewhere, and nothing may be fetched from elsewhere: else it fails."""
-import html.parser, pathlib, re, shutil, subprocess, sys, tempfile, urllib.parse
+import pathlib, re, shutil, subprocess, sys, tempfile
+
+from html_pages import check_pages
 
 root = pathlib.Path(__file__).resolve().parents[2]
 BESIDE = {"CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md", "README.md": "about.md"}  # pages from outside docs/
@@ -52,57 +54,6 @@ def stage(pages):
     return [p for p in pages.rglob("*.md")]
 
 
-class Page(html.parser.HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.links, self.fetched, self.ids = [], [], set()
-
-    def handle_starttag(self, tag, attrs):
-        a = dict(attrs)
-        if a.get("id"):
-            self.ids.add(a["id"])
-        if tag == "a" and a.get("name"):
-            self.ids.add(a["name"])
-        if tag == "a" and a.get("href"):
-            self.links.append(a["href"])
-        for name in ("src", "data"):
-            if a.get(name):
-                self.fetched.append(a[name])
-        if tag == "link" and a.get("href") and a.get("rel") not in ("canonical",):
-            self.fetched.append(a["href"])
-
-
-def check(site):
-    bad, pages = [], {}
-    for path in site.rglob("*.html"):
-        page = Page()
-        page.feed(path.read_text())
-        pages[path.resolve()] = page
-    links = 0
-    for path, page in pages.items():
-        name = path.relative_to(site.resolve())
-        for target in page.fetched:
-            if re.match(r"(https?:)?//", target):
-                bad.append(f"{name}: fetches {target}")
-        for target in page.links + page.fetched:
-            if re.match(r"([a-z]+:|//)", target) or target in ("#", ""):
-                continue
-            links += 1
-            file, _, anchor = target.partition("#")
-            to = (path.parent / urllib.parse.unquote(file.split("?")[0])).resolve() if file else path
-            if to.is_dir():
-                to = to / "index.html"
-            if not to.exists():
-                if name.as_posix() != "404.html":
-                    bad.append(f"{name}: {target} leads nowhere")
-            elif anchor and to in pages and urllib.parse.unquote(anchor) not in pages[to].ids:
-                bad.append(f"{name}: {target}: no such heading")
-    for css in site.rglob("*.css"):
-        if re.search(r"url\(['\"]?(https?:)?//", css.read_text(errors="replace")):
-            bad.append(f"{css.relative_to(site)}: fetches from elsewhere")
-    return bad, len(pages), links
-
-
 def main():
     if len(sys.argv) != 2:
         sys.exit("usage: apps/packaging/site.py OUT")
@@ -126,7 +77,8 @@ def main():
             sys.exit(77)
         if said.returncode:
             sys.exit(said.stdout + said.stderr)
-        bad, pages, links = check(work / "site")
+        # Shown for any address, so its own paths are of none.
+        bad, pages, links = check_pages(work / "site", lambda page, _, lost: lost and page == "404.html")
         if bad:
             sys.exit("\n".join(bad))
         if out.exists():

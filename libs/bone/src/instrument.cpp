@@ -9,10 +9,10 @@ namespace {
 
 constexpr double kMmPerFrench = 1.0 / 3, kTubeLengthMm = 60, kBladeMm = 1;
 
-Instrument cutting(InstrumentKind kind, std::string name, const Burr& edge) {
+Instrument cutting(InstrumentKind kind, const Burr& edge) {
   Instrument i;
   i.kind = kind;
-  i.name = std::move(name);
+  i.name = edge.name();
   i.head = edge.head();
   i.shaft = edge.shaft();
   i.edge = edge;
@@ -44,7 +44,7 @@ std::vector<CutDepth> cut_depths(ShapeOf shape_of) {
 const std::vector<Instrument>& instrument_library() {
   static const std::vector<Instrument> library = [] {
     std::vector<Instrument> all;
-    for (const Burr& b : burr_library()) all.push_back(cutting(InstrumentKind::burr, b.name(), b));
+    for (const Burr& b : burr_library()) all.push_back(cutting(InstrumentKind::burr, b));
     for (const int french : {5, 7, 8, 10, 12}) {
       const double outer_mm = french * kMmPerFrench, size = french / 10.0;
       Instrument i = rod(InstrumentKind::sucker, "sucker " + std::to_string(french) + " Fr", outer_mm, outer_mm);
@@ -60,7 +60,7 @@ const std::vector<Instrument>& instrument_library() {
     all.push_back(rod(InstrumentKind::probe, "hook 2 mm", 2, 1));
     Burr teeth{BurrKind::cutting, kBladeMm, 3, 1.35, BurrShape::cylinder};
     teeth.length_mm = 25;
-    Instrument saw = cutting(InstrumentKind::saw, "saw 25 mm", teeth);
+    Instrument saw = cutting(InstrumentKind::saw, teeth);
     saw.shaft.start_radius_mm = saw.shaft.end_radius_mm = 1.5 * kBladeMm;  // the chuck, which does not follow into the cut
     saw.shaft.start_mm = saw.head.length_mm + saw.head.end_radius_mm + saw.shaft.start_radius_mm;
     saw.speed_share = 0.25;

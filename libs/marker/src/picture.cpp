@@ -47,7 +47,8 @@ const video::Module& video_module() {
       }
       return *m;
     }
-    throw Error(ExitCode::failed, "what reads cameras and videos (osteo-camera.so) " + (why.empty() ? "is not on this machine" : "cannot be loaded: " + why),
+    throw Error(ExitCode::failed,
+                "what reads cameras and videos (osteo-camera.so) " + (why.empty() ? "is not on this machine" : "cannot be loaded: " + why),
                 "install the package osteo-camera, or name the file in OSTEO_CAMERA_MODULE");
   }();
   return module;

@@ -15,7 +15,9 @@ struct Capture {
 namespace {
 
 // What went wrong is said by the caller, and without the names of files.
-void quiet() { cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); }
+void quiet() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+}
 
 void gray_of(const cv::Mat& m, GrayPicture& p) {
   cv::Mat gray;
@@ -29,7 +31,9 @@ void gray_of(const cv::Mat& m, GrayPicture& p) {
   for (int y = 0; y < gray.rows; ++y) p.pixels.insert(p.pixels.end(), gray.ptr<std::uint8_t>(y), gray.ptr<std::uint8_t>(y) + gray.cols);
 }
 
-bool is_picture(const char* file) { return cv::haveImageReader(file); }
+bool is_picture(const char* file) {
+  return cv::haveImageReader(file);
+}
 
 bool read_picture(const char* file, GrayPicture& picture) {
   quiet();
@@ -39,7 +43,9 @@ bool read_picture(const char* file, GrayPicture& picture) {
   return true;
 }
 
-Capture* opened(cv::VideoCapture&& capture) { return capture.isOpened() ? new Capture{std::move(capture)} : nullptr; }
+Capture* opened(cv::VideoCapture&& capture) {
+  return capture.isOpened() ? new Capture{std::move(capture)} : nullptr;
+}
 
 Capture* open_video(const char* file) {
   quiet();
@@ -61,7 +67,9 @@ Capture* open_camera(const char* device, int width, int height, double fps) {
   return camera;
 }
 
-void close(Capture* c) { delete c; }
+void close(Capture* c) {
+  delete c;
+}
 
 bool next(Capture* c, GrayPicture& picture) {
   cv::Mat m;
@@ -70,11 +78,15 @@ bool next(Capture* c, GrayPicture& picture) {
   return true;
 }
 
-double fps(Capture* c) { return c->capture.get(cv::CAP_PROP_FPS); }
+double fps(Capture* c) {
+  return c->capture.get(cv::CAP_PROP_FPS);
+}
 
 constexpr Module kModule{kModuleVersion, is_picture, read_picture, open_video, open_camera, close, next, fps};
 
 }  // namespace
 }  // namespace osteo::video
 
-extern "C" [[gnu::visibility("default")]] const osteo::video::Module* osteo_video_module() { return &osteo::video::kModule; }
+extern "C" [[gnu::visibility("default")]] const osteo::video::Module* osteo_video_module() {
+  return &osteo::video::kModule;
+}

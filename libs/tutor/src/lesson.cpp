@@ -59,7 +59,8 @@ Lesson read_lesson(const SessionReader& session, double from_s, double to_s) {
       } else if (a.is(ActionKind::setting) || (a.tick >= lesson.first_tick && row_of(a).moves_dust)) {
         lesson.actions.push_back(a);
         lesson.actions.back().tick -= lesson.first_tick;
-      } else if (a.is(ActionKind::grip) || a.is(ActionKind::guide) || a.is(ActionKind::cutting_guide) || (a.tick >= lesson.first_tick && !plays_on(a))) {
+      } else if (a.is(ActionKind::grip) || a.is(ActionKind::guide) || a.is(ActionKind::cutting_guide) ||
+                 (a.tick >= lesson.first_tick && !plays_on(a))) {
         throw Error(ExitCode::usage,
                     "at " + at_s(a.tick) + " the session has '" + std::string(name_of(a)) + "', which hands alone do not repeat",
                     "play a part before or behind it: --from-s, --to-s");
