@@ -17,6 +17,7 @@ _osteo() {
     "tetrahedralize --method") COMPREPLY=($(compgen -W "grid grid-conforming graded tetgen cgal " -- "$cur")); return ;;
     "skin --method") COMPREPLY=($(compgen -W "embedded frames " -- "$cur")); return ;;
     "bone-stiffness --law") COMPREPLY=($(compgen -W "morgan_2003 keller_1994 carter_hayes_1977 keyak_1998 " -- "$cur")); return ;;
+    "bone-stiffness --weight") COMPREPLY=($(compgen -W "apparent in_situ " -- "$cur")); return ;;
     "bone-stiffness --order") COMPREPLY=($(compgen -W "auto t4 t10 t4_mean " -- "$cur")); return ;;
     "fem --law") COMPREPLY=($(compgen -W "auto linear stvk neo_hooke neo_hooke_split corotated " -- "$cur")); return ;;
     "fem --order") COMPREPLY=($(compgen -W "auto t4 t10 t4_mean " -- "$cur")); return ;;
@@ -73,7 +74,7 @@ _osteo() {
     voxelize) flags="$flags --xml --describe --spacing-mm --resolution --margin-voxels --margin --like --grid-out" ;;
     tetrahedralize) flags="$flags --xml --describe --method --spacing-mm --resolution --margin --target-dihedral-deg --keep-thin --levels --surface-spacing-mm --max-volume-mm3 --clean --time-limit-s --memory-limit-gb" ;;
     skin) flags="$flags --xml --describe --method --neighbours" ;;
-    bone-stiffness) flags="$flags --xml --describe --law --density-per-1000-hu --density-at-0-hu --ash-correction --least-mpa --most-mpa --step-percent --keep-loose --load --order --map-out --report-out" ;;
+    bone-stiffness) flags="$flags --xml --describe --law --density-per-1000-hu --density-at-0-hu --ash-correction --weight --least-mpa --most-mpa --step-percent --keep-loose --load --order --map-out --report-out" ;;
     fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out --nodes-out" ;;
     calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --deformed-out --map-out --course-out" ;;
     simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;

@@ -112,8 +112,8 @@ StageInfo BoneStiffnessStage::info() {
           "is fixed and loaded, and Poisson's ratio; the young_kpa of its material is not used, while its regions (a screw, a plate) "
           "keep their own stiffness. The file can be solved by CalculiX or Abaqus, and by 'osteo fem', given as mesh and as problem. "
           "What nothing holds has no solution: crumbs of the mesh below 1 % of the volume are left out, which is told. The laws were "
-          "measured on long bones, none on a skull, and the CT's blur makes thin cortex too soft. Gravity weighs by the "
-          "problem's density_kg_m3.",
+          "measured on long bones, none on a skull, and the CT's blur makes thin cortex too soft. Density is "
+          "written too (--weight), so that a load's gravity weighs by the CT; regions weigh by their density_kg_m3.",
       .inputs = {{"mesh", {DataKind::tets}, "bone, as tetrahedralize makes it"},
                  {"ct", {DataKind::image}, "the CT that it was made from, in HU"},
                  {"problem", {DataKind::document}, "what is fixed, loads, Poisson's ratio, in JSON"}},
@@ -122,15 +122,16 @@ StageInfo BoneStiffnessStage::info() {
                   {"report", {DataKind::document}, "moduli, mass, what was limited, in JSON", true}},
       .references = {"E. Morgan, H. Bayraktar, T. Keaveny, Journal of Biomechanics 36, 2003", "T. Keller, Journal of Biomechanics 27, 1994",
                      "D. Carter, W. Hayes, Journal of Bone and Joint Surgery 59-A, 1977",
-                     "J. Keyak et al., Journal of Biomechanics 31, 1998", "E. Schileo et al., Journal of Biomechanics 41, 2008",
-                     "F. Taddei et al., Medical Engineering and Physics 29, 2007"},
+                     "J. Keyak et al., Journal of Biomechanics 31, 1998",
+                     "W. Schneider, T. Bortfeld, W. Schlegel, Physics in Medicine and Biology 45, 2000",
+                     "E. Schileo et al., Journal of Biomechanics 41, 2008", "F. Taddei et al., Medical Engineering and Physics 29, 2007"},
       .example = "osteo bone-stiffness jaw.vtu ct.nrrd problem.json jaw.inp --density-per-1000-hu 0.76 --report-out jaw.json"};
 }
 
 std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
   const Tets given = std::get<Tets>(inputs[0]);
   const std::string& text = std::get<Document>(inputs[2]).json;
-  TissueProblem problem = parse_tissue_problem(text, *given);
+  TissueProblem problem = parse_tissue_problem(text, *given, true, Weight::apart);
   const std::size_t n = load_named(problem, p.load);
   Held held;
   if (!p.keep_loose) {
@@ -138,7 +139,7 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
     if (held.loose_parts > 0) {
       context.warn(std::to_string(held.loose_parts) + " parts of " + format_number(std::round(100 * held.loose_mm3) / 100) +
                    " mm3 in all, which nothing holds, were left out; --keep-loose keeps them");
-      problem = parse_tissue_problem(text, held.mesh);
+      problem = parse_tissue_problem(text, held.mesh, true, Weight::apart);
     }
   }
   const TetMesh& mesh = held.loose_parts > 0 ? held.mesh : *given;
@@ -148,13 +149,19 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
                 "leave \"law\" out: linear");
   const BoneStiffness bone = bone_stiffness(mesh, std::get<Image>(inputs[1]), p.density, p.step_percent / 100, context.sub(0, 0.7));
   std::vector<Material> materials(mesh.tets.size());
-  std::size_t of_regions = 0;
+  std::size_t of_regions = 0, weightless = 0;
   for (std::size_t t = 0; t < materials.size(); ++t) {
     const Material& own = problem.materials[problem.materials.size() == 1 ? 0 : t];
     const bool region = !problem.in_region.empty() && problem.in_region[t] != 0;
     of_regions += region ? 1 : 0;
-    materials[t] = region ? own : Material{bone.young_mpa[t], own.poisson};
+    materials[t] = region ? own : Material{bone.young_mpa[t], own.poisson, bone.density_kg_m3[t]};
+    weightless += region && own.density_kg_m3 == 0 ? 1 : 0;
   }
+  const double pull = length(problem.loads[n].gravity_m_s2);
+  if (weightless > 0 && pull > 0)
+    throw Error(ExitCode::usage,
+                std::to_string(weightless) + " tetrahedra of the problem's regions have no \"density_kg_m3\", and the load has gravity",
+                "give each region one; titanium has 4430");
   problem.materials = materials;
   const Elements elements = elements_for(LawChoice::automatic, p.order, problem, mesh);
   const FemBody body(points_of(mesh), tets_of(mesh), materials, elements.law, elements.order);
@@ -163,11 +170,12 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
   const std::vector<double> volume = volumes_mm3(mesh);
   std::vector<double> at_point(mesh.points_mm.size()), shared(mesh.points_mm.size());
   std::vector<double> young(mesh.tets.size());
-  double sum = 0, sum_hu = 0;
+  double sum = 0, sum_hu = 0, kg = 0;
   for (std::size_t t = 0; t < volume.size(); ++t) {
     sum += volume[t] * materials[t].young_mpa;
     young[t] = materials[t].young_mpa;
     sum_hu += volume[t] * static_cast<double>(bone.hu[t]);
+    kg += volume[t] * materials[t].density_kg_m3 * 1e-9;
     for (const std::uint32_t v : mesh.tets[t]) {
       at_point[v] += volume[t] * materials[t].young_mpa;
       shared[v] += volume[t];
@@ -186,7 +194,9 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
          {"loose_mm3_left_out", held.loose_mm3},
          {"materials", bone.materials},
          {"volume_mm3", bone.volume_mm3},
-         {"mass_g", bone.mass_g},
+         {"mass_g", 1000 * kg},
+         {"weight", EnumNames<BoneWeight>::values[static_cast<std::size_t>(p.density.weight)]},
+         {"gravity_n", pull * kg},
          {"mean_hu", sum_hu / bone.volume_mm3},
          {"mean_young_mpa", sum / bone.volume_mm3},
          {"young_mpa_by_volume", std::move(of_volume)},
@@ -201,7 +211,7 @@ std::vector<Data> BoneStiffnessStage::run(const Params& p, std::span<const Data>
          {"order_because", elements.because}};
   context.report("mean_young_mpa", sum / bone.volume_mm3);
   context.report("materials", static_cast<std::int64_t>(bone.materials));
-  context.report("mass_g", bone.mass_g);
+  context.report("mass_g", 1000 * kg);
   const BoneDensity guess;
   if (p.density.per_1000_hu == guess.per_1000_hu && p.density.at_0_hu == guess.at_0_hu)
     context.warn("density by a guess of " + format_number(guess.per_1000_hu) +

@@ -6,11 +6,11 @@
 
 #include "osteo/base/error.h"
 #include "osteo/data/tet_mesh.h"
+#include "osteo/tissue/fem.h"
 
 namespace osteo::tissue {
 
 std::vector<double> masses(const TissueModel& model, double density_kg_m3) {
-  constexpr double kTonnesPerMm3 = 1e-12;  // of 1 kg/m3
   std::vector<double> mass(model.point_count());
   const auto& r = model.rest();
   for (const auto& t : model.tets()) {

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kAshOfApparent = 0.598;
 constexpr double kMostOutside = 0.05;  // of the volume: more is another CT
+constexpr double kLeastDensity = 1;    // kg/m3, of air: all that has a volume has a weight
 constexpr int kMostAlongEdge = 64;     // samples: a tetrahedron of 32 voxels is no longer resolved finer
 
 void require_usable(const BoneDensity& d, double step) {
@@ -31,6 +32,13 @@ double ash_density(double hu, const BoneDensity& density) {
 
 double apparent_density(double hu, const BoneDensity& density) {
   return ash_density(hu, density) / kAshOfApparent;
+}
+
+double weighed_density(double hu, const BoneDensity& density) {
+  if (density.weight == BoneWeight::apparent) return apparent_density(hu, density);
+  constexpr double kFrom = 100, kAtFrom = 1.017 + 0.000592 * kFrom;
+  if (hu >= kFrom) return 1.017 + 0.000592 * hu;
+  return hu >= 0 ? 1 + hu / kFrom * (kAtFrom - 1) : std::max(0.0, 1 + hu / 1000);
 }
 
 double young_mpa(double hu, const BoneDensity& density) {
@@ -96,7 +104,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
             const auto v = static_cast<std::size_t>(low);
             sum += law[v] + (where - low) * (law[std::min(v + 1, law.size() - 1)] - law[v]);
             sum_hu += hu;
-            sum_density += apparent_density(hu, density);
+            sum_density += weighed_density(hu, density);
           }
         }
       }
@@ -124,7 +132,7 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
     throw Error(ExitCode::usage, format_number(std::round(1000 * s.share_outside) / 10) + " % of the mesh lies outside of the CT",
                 "the CT is the one that the mesh was made from, before it was cropped; 'osteo info' prints where each is");
   struct Group {
-    double volume = 0, sum = 0;
+    double volume = 0, sum = 0, grams = 0;
   };
   const auto group_of = [&](double e) { return step > 0 ? std::round(std::log(e / density.least_mpa) / std::log1p(step)) : e; };
   std::map<double, Group> groups;
@@ -132,13 +140,15 @@ BoneStiffness bone_stiffness(const TetMesh& mesh, const Image& ct, const BoneDen
     Group& g = groups[group_of(s.young_mpa[t])];
     g.volume += volume[t];
     g.sum += volume[t] * s.young_mpa[t];
+    g.grams += grams[t];
   }
   s.materials = groups.size();
-  if (step > 0) {
-    for (double& e : s.young_mpa) {
-      const Group& g = groups[group_of(e)];
-      if (g.volume > 0) e = g.sum / g.volume;
-    }
+  s.density_kg_m3.resize(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const Group& g = groups[group_of(s.young_mpa[t])];
+    if (!(g.volume > 0)) continue;
+    s.density_kg_m3[t] = std::max(kLeastDensity, 1e6 * g.grams / g.volume);
+    if (step > 0) s.young_mpa[t] = g.sum / g.volume;
   }
   return s;
 }

@@ -26,7 +26,8 @@ Material material_of(const JsonFile& file, const JsonValue& at, const std::strin
 // Reads a problem onto a mesh, part by part; every value is checked with its line.
 class ProblemReader {
  public:
-  ProblemReader(std::string_view json, const TetMesh& mesh) : file_(json, "tissue problem"), mesh_(mesh), held_(mesh.points_mm.size()) {}
+  ProblemReader(std::string_view json, const TetMesh& mesh, Weight weight)
+      : file_(json, "tissue problem"), mesh_(mesh), weight_(weight), held_(mesh.points_mm.size()) {}
 
   TissueProblem read(bool needs_loads) {
     const JsonValue& root = file_.root();
@@ -37,7 +38,7 @@ class ProblemReader {
     const JsonValue& general = file_.need(root, "", "material");
     allow(general, "material", Names{"young_kpa", "poisson", "density_kg_m3", "about"});
     problem_.general = material_of(file_, general, "material");
-    density_.assign(mesh_.tets.size(), density_of(general, "material").value_or(0));
+    problem_.general.density_kg_m3 = density_of(general, "material").value_or(0);
     const auto& regions = items(root, "regions", false);
     problem_.materials.assign(regions.empty() ? 1 : mesh_.tets.size(), problem_.general);
     problem_.in_region.assign(regions.empty() ? 0 : mesh_.tets.size(), 0);
@@ -107,16 +108,16 @@ class ProblemReader {
 
   void read_region(const JsonValue& r, const std::string& where) {
     const Place in = place(r, where, {"young_kpa", "poisson", "density_kg_m3"});
-    const Material m = material_of(file_, r, where);
+    Material m = material_of(file_, r, where);
     const std::optional<double> density = density_of(r, where);
     std::size_t hit = 0;
     for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
       Vec3 middle{};
       for (const std::uint32_t p : mesh_.tets[t]) middle += from_floats(mesh_.points_mm[p]) / 4;
       if (!in(middle)) continue;
+      m.density_kg_m3 = density.value_or(problem_.materials[t].density_kg_m3);
       problem_.materials[t] = m;
       problem_.in_region[t] = 1;
-      if (density) density_[t] = *density;
       ++hit;
     }
     if (hit == 0) throw file_.wrong(r, where + ": no tetrahedron lies in it", kWhere);
@@ -234,13 +235,18 @@ class ProblemReader {
 
   void add_gravity(TissueLoad& load, const JsonValue& g, const std::string& where) {
     const Vec3 pull = triple(g, where + ": \"gravity_m_s2\"", 1e4);
+    if (weight_ == Weight::apart) {
+      load.gravity_m_s2 = pull;
+      return;
+    }
     constexpr double kNewtonPerMm3 = 1e-9;  // of 1 kg/m3 at 1 m/s2
     for (std::size_t t = 0; t < mesh_.tets.size(); ++t) {
-      if (density_[t] == 0)
+      const double density = problem_.materials[problem_.materials.size() == 1 ? 0 : t].density_kg_m3;
+      if (density == 0)
         throw file_.wrong(g,
                           where + ": gravity needs a \"density_kg_m3\" for all of the body; tetrahedron " + std::to_string(t) + " has none",
                           "give the material one; soft tissue has about 1050, bone 1900");
-      load.add_in_tet(mesh_.tets[t], pull * (density_[t] * volume_of(t) * kNewtonPerMm3));
+      load.add_in_tet(mesh_.tets[t], pull * (density * volume_of(t) * kNewtonPerMm3));
     }
   }
 
@@ -283,19 +289,19 @@ class ProblemReader {
 
   const JsonFile file_;
   const TetMesh& mesh_;
+  const Weight weight_;
   TissueProblem problem_;
-  std::vector<bool> held_;       // along all axes
-  std::vector<double> density_;  // of each tetrahedron; 0: not given
-  TriMesh boundary_;             // made when a surface is loaded
+  std::vector<bool> held_;  // along all axes
+  TriMesh boundary_;        // made when a surface is loaded
   std::vector<std::uint32_t> point_of_;
 };
 
 }  // namespace
 
-TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads) {
+TissueProblem parse_tissue_problem(std::string_view json, const TetMesh& mesh, bool needs_loads, Weight weight) {
   if (const std::size_t first = json.find_first_not_of(" \t\r\n"); first != std::string_view::npos && json[first] == '*')
-    return tissue::problem_of_inp(json, mesh, needs_loads);
-  return ProblemReader(json, mesh).read(needs_loads);
+    return tissue::problem_of_inp(json, mesh, needs_loads, weight);
+  return ProblemReader(json, mesh, weight).read(needs_loads);
 }
 
 TissueModel model_of_problem(const TetMesh& mesh, const TissueProblem& problem, const std::optional<std::string>& constants_json) {

@@ -23,7 +23,7 @@ class Reader {
           "give the same .inp file as mesh and as problem");
   }
 
-  TissueProblem run(bool needs_loads) {
+  TissueProblem run(bool needs_loads, Weight weight) {
     Material* open = nullptr;
     bool in_step = false, large = false;
     const auto held_before = [&] {
@@ -40,19 +40,21 @@ class Reader {
         if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
         if (card.options.contains("TYPE") && card.options.at("TYPE") != "ISO" && card.options.at("TYPE") != "ISOTROPIC")
           throw fail(card, "only isotropic elasticity is read");
-        *open = {number(card, 0, 0), number(card, 0, 1)};
+        open->young_mpa = number(card, 0, 0);
+        open->poisson = number(card, 0, 1);
         law(card, ElasticLaw::linear);
       } else if (card.name == "DENSITY") {
         if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
-        densities_[open] = number(card, 0, 0);
-        if (!(densities_[open] > 0)) throw fail(card, "a density is above 0 (tonnes/mm3)");
+        open->density_kg_m3 = number(card, 0, 0) / kTonnesPerMm3;
+        if (!(open->density_kg_m3 > 0)) throw fail(card, "a density is above 0 (tonnes/mm3)");
       } else if (card.name == "HYPERELASTIC") {
         if (open == nullptr) throw fail(card, "it belongs to no *MATERIAL");
         if (!card.options.contains("NEO HOOKE")) throw fail(card, "of hyperelastic laws only NEO HOOKE is read");
         const double mu = 2 * number(card, 0, 0), d1 = number(card, 0, 1);
         if (!(d1 > 0)) throw fail(card, "D1 must be above 0: a solid that cannot change its volume is not read");
         const double bulk = 2 / d1;
-        *open = {9 * bulk * mu / (3 * bulk + mu), (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu))};
+        open->young_mpa = 9 * bulk * mu / (3 * bulk + mu);
+        open->poisson = (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu));
         law(card, ElasticLaw::neo_hooke_split);
       } else if (card.name == "SOLID SECTION") {
         sections_.push_back({option(card, "ELSET"), option(card, "MATERIAL"), &card});
@@ -81,6 +83,8 @@ class Reader {
     settle_boundary();
     if (needs_loads && problem_.loads.empty()) throw Error(ExitCode::usage, "the tissue problem, loads: there is no *STEP");
     materials();
+    if (weight == Weight::apart && !pulls_.empty())
+      throw fail(*pulls_.front().card, "gravity of an .inp weighs by its own *DENSITY, and cannot be kept apart; give the problem in JSON");
     for (const Pull& p : pulls_) pull(p);
     problem_.order = file_.quadratic ? TetOrder::t10 : TetOrder::t4;
     if (problem_.law == ElasticLaw::linear && large) problem_.law = ElasticLaw::stvk;
@@ -256,13 +260,12 @@ class Reader {
       if (found == file_.corners_of.end()) throw fail(*p.card, "there is no element " + std::to_string(element));
       const auto at = [&](std::size_t i) { return from_floats(file_.mesh.points_mm[found->second[i]]); };
       const double volume = std::abs(dot(cross(at(1) - at(0), at(2) - at(0)), at(3) - at(0))) / 6,
-                   density = density_of_tet_[file_.tet_of.at(element)];
+                   density = problem_.materials[problem_.materials.size() == 1 ? 0 : file_.tet_of.at(element)].density_kg_m3;
       if (!(density > 0)) throw fail(*p.card, "the material of element " + std::to_string(element) + " has no *DENSITY");
-      load.add_in_tet(found->second, p.mm_s2 * (density * volume));
+      load.add_in_tet(found->second, p.mm_s2 * (density * kTonnesPerMm3 * volume));
     }
   }
   void materials() {
-    density_of_tet_.assign(file_.mesh.tets.size(), 0);
     if (sections_.empty()) throw Error(ExitCode::usage, "the tissue problem, materials: there is no *SOLID SECTION");
     problem_.materials.assign(file_.mesh.tets.size(), {0, 0});
     for (const Section& s : sections_) {
@@ -274,8 +277,6 @@ class Reader {
         const auto t = file_.tet_of.find(e);
         if (t == file_.tet_of.end()) throw fail(*s.card, "there is no element " + std::to_string(e));
         problem_.materials[t->second] = m->second;
-        const auto d = densities_.find(&m->second);
-        density_of_tet_[t->second] = d != densities_.end() ? d->second : 0;
       }
     }
     for (std::size_t t = 0; t < problem_.materials.size(); ++t) {
@@ -284,7 +285,8 @@ class Reader {
     }
     problem_.general = problem_.materials[0];
     const auto same = [&](const Material& m) {
-      return m.young_mpa == problem_.materials[0].young_mpa && m.poisson == problem_.materials[0].poisson;
+      const Material& first = problem_.materials[0];
+      return m.young_mpa == first.young_mpa && m.poisson == first.poisson && m.density_kg_m3 == first.density_kg_m3;
     };
     if (std::all_of(problem_.materials.begin(), problem_.materials.end(), same)) problem_.materials.resize(1);
   }
@@ -294,8 +296,6 @@ class Reader {
   std::map<std::string, Material> materials_;
   std::vector<Section> sections_;
   std::vector<Pull> pulls_;
-  std::map<const Material*, double> densities_;  // tonnes/mm3
-  std::vector<double> density_of_tet_;
   std::map<long, std::uint8_t> held_;
   const InpCard* last_boundary_ = nullptr;
   bool settled_ = false;
@@ -303,8 +303,8 @@ class Reader {
 
 }  // namespace
 
-TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads) {
-  return Reader(text, mesh).run(needs_loads);
+TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads, Weight weight) {
+  return Reader(text, mesh).run(needs_loads, weight);
 }
 
 }  // namespace tissue
@@ -472,20 +472,21 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
     t += "\n";
   }
   // Equal materials share a set.
-  std::map<std::pair<double, double>, std::vector<std::size_t>> sets;
+  std::map<std::array<double, 3>, std::vector<std::size_t>> sets;
   for (std::size_t e = 0; e < body.element_count(); ++e) {
     const Material& m = body.materials()[body.materials().size() == 1 ? 0 : e];
-    sets[{m.young_mpa, m.poisson}].push_back(e + 1);
+    sets[{m.young_mpa, m.poisson, m.density_kg_m3}].push_back(e + 1);
   }
   int number = 0;
   for (const auto& [material, elements] : sets) {
     ++number;
-    const Material m{material.first, material.second};
+    const Material m{material[0], material[1], material[2]};
     const bool split = body.law() == ElasticLaw::neo_hooke_split;
-    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%s, %s\n*ELSET, ELSET=E%d\n", number,
-                  split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC", field(split ? m.shear_mpa() / 2 : m.young_mpa).c_str(),
-                  field(split ? 2 / m.bulk_mpa() : m.poisson).c_str(), number);
+    std::snprintf(line, sizeof line, "*MATERIAL, NAME=M%d\n*%s\n%s, %s\n", number, split ? "HYPERELASTIC, NEO HOOKE" : "ELASTIC",
+                  field(split ? m.shear_mpa() / 2 : m.young_mpa).c_str(), field(split ? 2 / m.bulk_mpa() : m.poisson).c_str());
     t += line;
+    if (m.density_kg_m3 > 0) t += "*DENSITY\n" + field(m.density_kg_m3 * kTonnesPerMm3) + "\n";
+    t += "*ELSET, ELSET=E" + std::to_string(number) + "\n";
     for (std::size_t i = 0; i < elements.size(); ++i)
       t += std::to_string(elements[i]) + (i % 12 == 11 || i + 1 == elements.size() ? "\n" : ", ");
     std::snprintf(line, sizeof line, "*SOLID SECTION, ELSET=E%d, MATERIAL=M%d\n", number, number);
@@ -519,6 +520,12 @@ std::string inp_text(const FemBody& body, const TissueLoad& load) {
       if (f[a] == 0) continue;
       t += std::to_string(p + 1) + ", " + std::to_string(a + 1) + ", " + field(f[a]) + "\n";
     }
+  }
+  if (const double pull = length(load.gravity_m_s2); pull > 0) {
+    if (std::any_of(body.materials().begin(), body.materials().end(), [](const Material& m) { return !(m.density_kg_m3 > 0); }))
+      throw Error(ExitCode::usage, "gravity needs a density for all of the body");
+    const Vec3 along = load.gravity_m_s2 / pull;
+    t += "*DLOAD\nEALL, GRAV, " + field(1000 * pull) + ", " + field(along.x) + ", " + field(along.y) + ", " + field(along.z) + "\n";
   }
   return t + "*NODE PRINT, NSET=ALL\nU\n*END STEP\n";
 }

@@ -6,6 +6,6 @@
 
 namespace osteo::tissue {
 
-TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads);
+TissueProblem problem_of_inp(std::string_view text, const TetMesh& mesh, bool needs_loads, Weight weight);
 
 }  // namespace osteo::tissue

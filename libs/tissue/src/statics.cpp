@@ -83,6 +83,8 @@ Statics statics(const FemBody& body, const TissueLoad& load, const EquilibriumOp
     if (m.point >= body.point_count() || !std::isfinite(dot(m.by_mm, m.by_mm)))
       throw Error(ExitCode::usage, "a movement of point " + std::to_string(m.point) + " is not finite, or there is no such point");
   }
+  if (length(load.gravity_m_s2) > 0)
+    throw Error(ExitCode::unspecified, "gravity that is kept apart is for files; what solves wants it among the forces");
   const Touching touching(body, load.contacts);
   const Energy& energy = load.contacts.empty() ? static_cast<const Energy&>(body) : touching;
   // What touches something is not held by it.

@@ -10,7 +10,10 @@
 #include <set>
 
 #include "block.h"
+#include "calculix.h"
 #include "osteo/base/error.h"
+#include "osteo/io/inp_io.h"
+#include "osteo/tissue/problem.h"
 #include "osteo/tissue/statics.h"
 
 namespace osteo {
@@ -169,6 +172,90 @@ TEST(BoneStiffness, AGradedBarStretchesByTheIntegralOfItsCompliance) {
     // Half of force times way, in N mm.
     EXPECT_NEAR(2 * r.energy_mj / 0.01, 0.01 * 9 / compliance, 4e-3 * 0.01 * 9 / compliance) << step;
   }
+}
+
+TEST(BoneStiffness, WeighsByTheCt) {
+  const Block b = block(3, 3, 12, 1.0);
+  const auto of = [](Vec3 p) { return 200 + 100 * p.z; };
+  const Image ct = ct_of({3, 3, 12}, {0.5, 0.5, 0.5}, of);
+  BoneDensity d;
+  for (const BoneWeight weight : {BoneWeight::apparent, BoneWeight::in_situ}) {
+    d.weight = weight;
+    // Both lines of density are straight here, so the mean is that of the middle.
+    const double middle = weight == BoneWeight::apparent ? apparent_density(800, d) : 1.017 + 0.000592 * 800;
+    for (const double step : {0.0, 0.02, 0.5}) {
+      const BoneStiffness s = bone_stiffness(mesh_of(b), ct, d, step);
+      EXPECT_NEAR(s.mass_g, middle * 0.108, 1e-6 * s.mass_g) << step;
+      EXPECT_NEAR(mean(s.density_kg_m3, volumes(b)), 1000 * middle, 1e-3 * middle) << step;
+      // One density a material, so a file has as many materials as moduli.
+      std::set<std::pair<double, double>> both;
+      for (std::size_t t = 0; t < s.young_mpa.size(); ++t) both.insert({s.young_mpa[t], s.density_kg_m3[t]});
+      EXPECT_EQ(both.size(), s.materials);
+    }
+  }
+  // With marrow: water at 0 HU, air at -1000, without a step at 100.
+  EXPECT_DOUBLE_EQ(weighed_density(0, d), 1);
+  EXPECT_DOUBLE_EQ(weighed_density(-1000, d), 0);
+  EXPECT_DOUBLE_EQ(weighed_density(-3000, d), 0);
+  EXPECT_NEAR(weighed_density(99.9999, d), weighed_density(100, d), 1e-6);
+  EXPECT_NEAR(weighed_density(1524, d), 1.919, 1e-3);
+}
+
+// Hung up by its end a bar that is stiffer and heavier below stretches by the integral of what hangs below each place over EA.
+TEST(BoneStiffness, AGradedBarHangsByItsOwnWeight) {
+  const int n = 24;
+  const Block b = block(3, 3, n, 1.0);
+  const auto of = [](Vec3 p) { return 1500 - 45 * p.z; };
+  const Image ct = ct_of({3, 3, double(n)}, {0.5, 0.5, 0.5}, of);
+  BoneDensity d;
+  d.weight = BoneWeight::in_situ;
+  const double g = 9.81;
+  double below_n = 0, tip = 0;  // from the free end at z = 0 up to where it is held
+  for (int i = 0; i < 24'000; ++i) {
+    const Vec3 at{0, 0, (i + 0.5) / 1000};
+    const double weight = weighed_density(of(at), d) * 1e-6 * g * 9 * 0.001;
+    tip += (below_n + weight / 2) / (9 * young_mpa(of(at), d)) * 0.001;
+    below_n += weight;
+  }
+  const BoneStiffness s = bone_stiffness(mesh_of(b), ct, d, 0.02);
+  std::vector<Material> materials;
+  for (std::size_t t = 0; t < s.young_mpa.size(); ++t) materials.push_back({s.young_mpa[t], 0, s.density_kg_m3[t]});
+  for (const TetOrder order : {TetOrder::t4, TetOrder::t10}) {
+    const FemBody body(b.points, b.tets, materials, ElasticLaw::linear, order);
+    TissueLoad load;
+    load.gravity_m_s2 = {0, 0, -g};
+    for (std::uint32_t p = 0; p < b.points.size(); ++p) {
+      if (b.points[p].z > n - 1e-9) load.fixed.push_back(p);
+    }
+    const TissueLoad all = body.on_all_points(load);
+    EXPECT_THROW(static_cast<void>(statics(body, all)), Error);  // its weight is not among the forces
+    const std::string inp = inp_text(body, all);
+    const InpFile file = parse_inp(inp, "bar");
+    const TissueProblem read = parse_tissue_problem(inp, file.mesh);
+    const Statics r = statics(body, body.on_all_points(read.loads.at(0)));
+    ASSERT_TRUE(r.converged) << r.why;
+    EXPECT_NEAR(r.reaction_n.z, below_n, 1e-3 * below_n);
+    double sum = 0;
+    int ends = 0;
+    for (std::uint32_t p = 0; p < b.points.size(); ++p) {
+      if (b.points[p].z < 1e-9) sum += r.points_mm[p].z, ++ends;
+    }
+    EXPECT_NEAR(-sum / ends, tip, 5e-3 * tip);
+    std::printf("stretched by %.4f of what is in closed form\n", -sum / ends / tip);
+    if (!test::calculix_is_here()) {
+      std::printf("CalculiX (ccx) is not installed: agreement with it not tested\n");
+      continue;
+    }
+    const auto u = test::by_calculix(inp, body.point_count());
+    ASSERT_EQ(u.size(), body.point_count());
+    for (std::size_t p = 0; p < u.size(); ++p) ASSERT_LT(length(u[p] - (r.points_mm[p] - body.rest()[p])), 1e-5 * tip) << p;
+  }
+  // No weight without density, and none among forces that was to be apart.
+  const FemBody light(b.points, b.tets, {{100, 0.3}}, ElasticLaw::linear, TetOrder::t4);
+  TissueLoad load;
+  load.fixed = {0, 1, 2, 3};
+  load.gravity_m_s2 = {0, 0, -g};
+  EXPECT_THROW(static_cast<void>(inp_text(light, load)), Error);
 }
 
 TEST(BoneStiffness, SaysWhatItLimitsAndRefuses) {

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "block.h"
+#include "calculix.h"
 #include "derivatives.h"
 #include "mapped.h"
 #include "osteo/base/error.h"
@@ -503,26 +504,8 @@ TEST(Fem, CooksMembraneNearlyIncompressible) {
   EXPECT_LT(std::abs(rise[2][1] - 16.45), std::abs(rise[2][0] - 16.45));
 }
 
-// Displacements that CalculiX finds for the same file.
-std::vector<Vec3> calculix(const std::string& inp, std::size_t points) {
-  const test::ScratchFolder scratch;
-  const auto& folder = scratch.path();
-  std::ofstream(folder / "job.inp") << inp;
-  if (std::system(("cd " + folder.string() + " && OMP_NUM_THREADS=1 ccx job > ccx.log 2>&1").c_str()) != 0) return {};
-  std::ifstream in(folder / "job.dat");
-  std::vector<Vec3> u(points);
-  std::string line;
-  while (std::getline(in, line)) {
-    std::istringstream row(line);
-    std::size_t node = 0;
-    Vec3 v;
-    if (row >> node >> v.x >> v.y >> v.z && node >= 1 && node <= points) u[node - 1] = v;  // later steps overwrite
-  }
-  return u;
-}
-
 TEST(Fem, AgreesWithCalculix) {
-  if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
+  if (!test::calculix_is_here()) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
   const auto b = block(6, 3, 3, 2.0, [](Vec3 p) { return !(p.x > 5 && p.y > 3 && p.z > 3); });
   struct Case {
     ElasticLaw law;
@@ -544,7 +527,7 @@ TEST(Fem, AgreesWithCalculix) {
     EquilibriumSolver solver(body, body.rest(), load);
     const Equilibrium r = solver.solve(body, body.rest(), load.forces_n);
     ASSERT_TRUE(r.converged) << r.why;
-    const auto u = calculix(inp_text(body, load), body.point_count());
+    const auto u = test::by_calculix(inp_text(body, load), body.point_count());
     ASSERT_EQ(u.size(), body.point_count()) << "ccx failed on " << c.name;
     double off = 0, size = 0;
     for (std::size_t p = 0; p < u.size(); ++p) {

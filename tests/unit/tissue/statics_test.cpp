@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "block.h"
+#include "calculix.h"
 #include "osteo/base/error.h"
 #include "osteo/io/inp_io.h"
 #include "osteo/io/tet_io.h"
@@ -133,27 +134,8 @@ TEST(Statics, APlateStopsWhatIsPressed) {
   EXPECT_THROW(static_cast<void>(statics(body, p.loads[0])), Error);
 }
 
-// What ccx prints for U.
-std::vector<Vec3> by_calculix(const std::string& inp, std::size_t points) {
-  const test::ScratchFolder scratch;
-  const auto& folder = scratch.path();
-  std::ofstream(folder / "job.inp") << inp;
-  const bool ran = std::system(("cd " + folder.string() + " && OMP_NUM_THREADS=1 ccx job > ccx.log 2>&1").c_str()) == 0;
-  std::vector<Vec3> u(points);
-  std::size_t read = 0;
-  std::ifstream dat(folder / "job.dat");
-  for (std::string line; ran && std::getline(dat, line);) {
-    std::istringstream fields(line);
-    std::size_t n = 0;
-    Vec3 v;
-    if (fields >> n >> v.x >> v.y >> v.z && n >= 1 && n <= points) u[n - 1] = v, ++read;
-  }
-  if (read < points) u.clear();
-  return u;
-}
-
 TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
-  if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
+  if (!test::calculix_is_here()) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
   const Column c;
   // Coordinates that are nearly zero, as turned bodies have them: over 20 characters with all their digits.
   TetMesh mesh = c.mesh;
@@ -178,7 +160,7 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
       }
       const Statics ours = statics(body, all);
       ASSERT_TRUE(ours.converged) << ours.why;
-      const std::vector<Vec3> u = by_calculix(inp, body.point_count());
+      const std::vector<Vec3> u = test::by_calculix(inp, body.point_count());
       ASSERT_EQ(u.size(), body.point_count()) << load;
       double off = 0, most = 0;
       for (std::size_t q = 0; q < u.size(); ++q) {
@@ -199,7 +181,7 @@ TEST(Statics, AgreesWithCalculixNearZeroAndMoved) {
 // Contact pairs push faces where we push points: the same against a plane but for the depth that is left, and against a ball as far as the
 // mesh resolves what it touches.
 TEST(Statics, ContactAgreesWithCalculix) {
-  if (std::system("command -v ccx > /dev/null 2>&1") != 0) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
+  if (!test::calculix_is_here()) GTEST_SKIP() << "CalculiX (ccx) is not installed: agreement with it not tested";
   const Column c;
   const std::string press = R"("surfaces": [{"box_mm": [[-1,-1,59.9],[21,21,60.1]], "kpa": [0, 0, 2]}])";
   struct Case {
@@ -228,7 +210,7 @@ TEST(Statics, ContactAgreesWithCalculix) {
     const TissueLoad all = body.on_all_points(p.loads[0]);
     const Statics ours = statics(body, all);
     ASSERT_TRUE(ours.converged) << ours.why;
-    const std::vector<Vec3> u = by_calculix(inp_text(body, all), body.point_count());
+    const std::vector<Vec3> u = test::by_calculix(inp_text(body, all), body.point_count());
     ASSERT_EQ(u.size(), body.point_count()) << k.load;
     double off = 0, sum = 0;
     for (std::size_t q = 0; q < u.size(); ++q) {
@@ -266,15 +248,23 @@ TEST(Statics, ContactThatAnInpFileCannotHold) {
 TEST(Statics, GravityOfAnInpFile) {
   const Column c;
   const TissueProblem weight = problem_of(R"({"gravity_m_s2": [0, 0, -9.81]})", c.mesh);
-  const FemBody body(points_of(c.mesh), tets_of(c.mesh), weight.materials, ElasticLaw::linear, TetOrder::t4);
+  std::vector<Material> light = weight.materials;
+  for (Material& m : light) m.density_kg_m3 = 0;
+  const FemBody body(points_of(c.mesh), tets_of(c.mesh), light, ElasticLaw::linear, TetOrder::t4);
   std::string inp = inp_text(body, body.on_all_points(weight.loads[0]));
   inp.replace(inp.find("*CLOAD"), std::string::npos, "*DLOAD\nEALL, GRAV, 9810., 0., 0., -1.\n*END STEP\n");
   const InpFile file = parse_inp(inp, "x");
   EXPECT_THROW(static_cast<void>(parse_tissue_problem(inp, file.mesh)), Error);  // no *DENSITY
   inp.insert(inp.find("*ELSET"), "*DENSITY\n1e-9\n");
+  EXPECT_THROW(static_cast<void>(parse_tissue_problem(inp, file.mesh, true, Weight::apart)), Error);
   const TissueProblem again = parse_tissue_problem(inp, file.mesh);
   const Statics ours = statics(body, weight.loads[0]), there = statics(body, again.loads[0]);
   EXPECT_NEAR(there.energy_mj, ours.energy_mj, 1e-9 * ours.energy_mj);
+  // A density before the modulus, as others write it, is not forgotten.
+  const std::string density = "*DENSITY\n1e-9\n";
+  inp.erase(inp.find(density), density.size());
+  inp.insert(inp.find("*ELASTIC"), density);
+  EXPECT_EQ(statics(body, parse_tissue_problem(inp, file.mesh).loads[0]).energy_mj, there.energy_mj);
 }
 
 TEST(Statics, AllNodesAsVtu) {

@@ -30,6 +30,11 @@ struct BoneStiffnessStage {
     visit({"density_at_0_hu", "mineral at 0 HU, in g/cm3: from the same phantom", "", -1, 1}, p.density.at_0_hu);
     visit({"ash_correction", "ash is (mineral + 0.09) / 1.14, as was measured with a phantom of hydroxyapatite; off: they are the same"},
           p.density.ash_correction);
+    visit({"weight",
+           "what the bone weighs, in the file (*DENSITY) and under gravity. apparent: as the laws' specimens, wet and without marrow; "
+           "in_situ: "
+           "with the marrow in its pores, 1.017 + 0.000592 HU g/cm3 above 100 HU"},
+          p.density.weight);
     visit({"least_mpa", "softer places are made so stiff, which is counted", "MPa", 1e-6, 1e6}, p.density.least_mpa);
     visit({"most_mpa", "stiffer places (metal) are made so soft, which is counted", "MPa", 1e-6, 1e6}, p.density.most_mpa);
     visit({"step_percent", "materials are so far apart, each with the mean of its tetrahedra (0: each tetrahedron its own)", "%", 0, 100},

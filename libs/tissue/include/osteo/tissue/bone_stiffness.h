@@ -25,12 +25,22 @@ struct EnumNames<StiffnessLaw> {
   static constexpr std::array<std::string_view, 4> values{"morgan_2003", "keller_1994", "carter_hayes_1977", "keyak_1998"};
 };
 
+/// What bone weighs. apparent: as the laws' specimens, hydrated and without marrow. in_situ: with what fills its pores in the body,
+/// 1.017 + 0.000592 HU g/cm3 from 100 HU on (W. Schneider, T. Bortfeld, W. Schlegel, Phys. Med. Biol. 45, 2000), below on straight lines
+/// through water and air; the scanner's calibration has no say there.
+enum class BoneWeight : int { apparent, in_situ };
+template <>
+struct EnumNames<BoneWeight> {
+  static constexpr std::array<std::string_view, 2> values{"apparent", "in_situ"};
+};
+
 struct BoneDensity {
   StiffnessLaw law = StiffnessLaw::morgan_2003;
   /// Mineral in g/cm3 at 1000 HU above that at 0 HU, and at 0 HU: the line of the scanner's calibration phantom.
   double per_1000_hu = 0.8, at_0_hu = 0;
   /// Density of ash from that of the phantom's mineral: (r + 0.09) / 1.14 (E. Schileo et al., J. Biomech. 41, 2008); else the same.
   bool ash_correction = true;
+  BoneWeight weight = BoneWeight::apparent;
   double least_mpa = 1, most_mpa = 30'000;  ///< what comes out beyond is set to these
 };
 
@@ -38,12 +48,15 @@ struct BoneDensity {
 [[nodiscard]] double ash_density(double hu, const BoneDensity& density);
 /// Of ash by 0.598 (Schileo 2008), g/cm3.
 [[nodiscard]] double apparent_density(double hu, const BoneDensity& density);
+/// g/cm3, by density.weight; never below 0.
+[[nodiscard]] double weighed_density(double hu, const BoneDensity& density);
 /// MPa, not limited; 0 where there is no mineral.
 [[nodiscard]] double young_mpa(double hu, const BoneDensity& density);
 
 struct BoneStiffness {
-  std::vector<double> young_mpa;  ///< one a tetrahedron
-  std::vector<float> hu;          ///< mean of each
+  std::vector<double> young_mpa;      ///< one a tetrahedron
+  std::vector<float> hu;              ///< mean of each
+  std::vector<double> density_kg_m3;  ///< of each, by BoneDensity::weight: the mean of its material, so that all weighs as much as before
   double volume_mm3 = 0, mass_g = 0;
   std::size_t materials = 0;  ///< different moduli
   /// Share of the volume whose law gave less or more than the limits.

@@ -10,9 +10,12 @@
 
 namespace osteo {
 
+inline constexpr double kTonnesPerMm3 = 1e-12;  ///< of 1 kg/m3: the density that goes with mm, N and MPa
+
 struct Material {
   double young_mpa = 0.1;
   double poisson = 0.45;
+  double density_kg_m3 = 0;  ///< 0: not known
   [[nodiscard]] double shear_mpa() const { return young_mpa / (2 * (1 + poisson)); }
   [[nodiscard]] double bulk_mpa() const { return young_mpa / (3 * (1 - 2 * poisson)); }
   [[nodiscard]] double lambda_mpa() const { return young_mpa * poisson / ((1 + poisson) * (1 - 2 * poisson)); }

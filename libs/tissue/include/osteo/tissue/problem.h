@@ -42,15 +42,21 @@ struct TissueProblem {
   std::optional<ElasticLaw> law;  ///< what an .inp says, and JSON may
   std::optional<TetOrder> order;  ///< so too
 };
-/// Errors: usage with the line and the place in the text; for places that no point lies in; for a load on fixed points alone.
+/// Where a load's weight under gravity is: among its forces, by the problem's densities; or apart, as TissueLoad::gravity_m_s2, for whoever
+/// knows the densities better.
+enum class Weight { among_forces, apart };
+/// Errors: usage with the line and the place in the text; for places that no point lies in; for a load on fixed points alone; for gravity
+/// where there is no density (not if it is kept apart), or gravity of an .inp that is to be kept apart.
 /// Without `needs_loads` there may be none.
-[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true);
+[[nodiscard]] TissueProblem parse_tissue_problem(std::string_view text, const TetMesh& mesh, bool needs_loads = true,
+                                                 Weight weight = Weight::among_forces);
 /// A problem as an input file of CalculiX or Abaqus; `load` as FemBody::on_all_points() makes it. linear and stvk: *ELASTIC, without and
-/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Displacements are printed to the .dat file. Contact with planes (one triangle) and balls
+/// with NLGEOM; neo_hooke_split: *HYPERELASTIC. Densities that are known are written (*DENSITY), gravity that is apart as GRAV; else weight
+/// is among the forces (*CLOAD). Displacements are printed to the .dat file. Contact with planes (one triangle) and balls
 /// (5120, off by 0.1 % of the radius) is a *CONTACT PAIR, surface to surface, against tetrahedra that are held; its pressure grows with
 /// depth by stiffness_n_per_mm times points over area of what looks at it. There faces are pushed, here points: the same for a plane but
 /// for the depth that is left, and for a ball as far as the mesh resolves what it touches. Not read back. Error(usage) for neo_hooke,
-/// corotated and t4_mean, which are not known there, and for rigid things of another shape.
+/// corotated and t4_mean, which are not known there, for rigid things of another shape, and for gravity on what has no density.
 [[nodiscard]] std::string inp_text(const FemBody& body, const TissueLoad& load);
 /// The fast model of a problem on a mesh of voxels: in closed form, or with constants as calibrate writes them. Errors: usage.
 /// Constants that were learnt without the regions ("base") stand on one material.
