@@ -102,6 +102,9 @@ TetMesh tets_by_cgal(const TriangleSoup& surface, const CgalMeshOptions& options
   if (!self_intersections(surface, context).empty())
     throw Error(ExitCode::failed, "CGAL needs a surface that does not intersect itself; this one does", kAdvice);
   const TriangleSoup solid = compacted(solid_surface(surface, context).soup);
+  if (const std::uint64_t touching = check(mesh_of(solid)).nonmanifold_points; touching > 0)
+    context.warn("the surface touches itself at " + std::to_string(touching) +
+                 " points; towards such a point CGAL may make ever smaller tetrahedra, until its time is over: grid-conforming takes it");
   std::vector<K::Point_3> points;
   for (const Vec3 p : solid.points_mm) points.emplace_back(p.x, p.y, p.z);
   std::vector<std::array<std::size_t, 3>> triangles;

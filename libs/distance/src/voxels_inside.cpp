@@ -2,6 +2,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
@@ -276,8 +277,10 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
   const RowCrossings rows = scan(used, points, fans, frame.dims, context);
   context.progress(0.6);
   VoxelBits bits(frame);
+  constexpr std::size_t kRows = 1024;
   const std::size_t row_count = rows.first.size() - 1;
-  parallel_for(row_count, 1024, context.threads, [&](std::size_t begin, std::size_t end) {
+  std::vector<std::int64_t> surplus(row_count / kRows + 1, 0);
+  parallel_for(row_count, kRows, context.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
       int winding = 0;
       for (std::uint32_t c = rows.first[r]; c < rows.first[r + 1]; ++c) {
@@ -285,6 +288,7 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
         if (winding == 0) continue;
         const int stop = c + 1 < rows.first[r + 1] ? rows.items[c + 1].first : frame.dims[0];
         set_run(&bits.words[r * bits.words_per_row], rows.items[c].first, stop);
+        surplus[begin / kRows] += static_cast<std::int64_t>(winding - 1) * (stop - rows.items[c].first);
       }
     }
   });
@@ -334,7 +338,13 @@ VoxelBits voxels_inside(const TriangleSoup& soup, const Frame& frame, const Cont
     for (const auto d : decided_in) decided += d;
   }
   if (report != nullptr) {
-    *report = {fans.empty(), mended.open.size(), decided, mended.degenerate, mended.duplicates, mended.flipped};
+    *report = {fans.empty(),
+               mended.open.size(),
+               decided,
+               mended.degenerate,
+               mended.duplicates,
+               mended.flipped,
+               std::accumulate(surplus.begin(), surplus.end(), std::int64_t{0})};
   }
   context.progress(1.0);
   return bits;

@@ -156,6 +156,15 @@ TEST(Cgal, SaysWhatItCannotMesh) {
   EXPECT_THROW(static_cast<void>(tets_by_cgal(open, {})), Error);
   const auto crossed = test::joined(test::box({0, 0, 0}, {4, 4, 4}), test::box({2.1, 2.2, 2.3}, {7, 7, 7}));
   EXPECT_THROW(static_cast<void>(tets_by_cgal(crossed, {})), Error);
+  // Two balls that meet in a point: it does not end, is stopped, and was said before.
+  CgalMeshOptions brief;
+  brief.cell_mm = 2;
+  brief.limits.seconds = 2;
+  std::string told;
+  Context context;
+  context.on_log([&](LogLevel level, std::string_view message) { told += level == LogLevel::warning ? message : ""; });
+  EXPECT_THROW(static_cast<void>(tets_by_cgal(test::joined(test::sphere(10, 3), test::sphere(10, 3, {20, 0, 0})), brief, context)), Error);
+  EXPECT_NE(told.find("touches itself at 1 points"), std::string::npos) << told;
 }
 
 }  // namespace

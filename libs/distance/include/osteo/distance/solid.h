@@ -22,9 +22,8 @@ struct SolidSurface {
 /// O(patches * triangles). Errors: failed when nothing is left (a sheet, or twice the same surface the other way round).
 [[nodiscard]] SolidSurface solid_surface(const TriangleSoup& soup, const Context& context = {});
 
-/// Volume inside by that rule, mm3. Exact (divergence theorem, about a point of the surface) where the surface closes and does not overlap
-/// itself by more than 2 % or a four-hundredth of its extent times its area; else counted in voxels of a two-hundredth of the extent.
-/// Open surfaces: counted.
+/// Volume inside by that rule, mm3. Where the surface closes by the divergence theorem (about a point of the surface), less what of it
+/// lies within more than once, which is counted in voxels of a two-hundredth of the extent: exact without overlap. Open surfaces: counted.
 [[nodiscard]] double inside_volume_mm3(const TriangleSoup& soup, const Context& context = {});
 
 }  // namespace osteo

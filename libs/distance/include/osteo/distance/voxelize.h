@@ -40,6 +40,9 @@ struct InsideReport {
   std::uint64_t open_edges = 0;      ///< otherwise: edges that are not
   std::uint64_t by_solid_angle = 0;  ///< voxels near the openings that were decided by solid angles
   std::uint64_t degenerate = 0, duplicates = 0, flipped = 0;  ///< triangles mended for this (not moved)
+  /// Of the closed surface: over all voxels inside, how often it winds about them beyond once (signed: two less for inside out). 0 where
+  /// nothing overlaps and all faces outward.
+  std::int64_t surplus = 0;
 };
 
 /// Voxels whose centre is inside: generalized winding number of magnitude above 1/2 (A. Jacobson et al., Robust Inside-Outside
