@@ -134,6 +134,8 @@ struct WindowCommand {
     window.ct = open.ct;
     window.bone = open.bone;
     window.regions = open.regions;
+    window.planned_cuts = planned_cuts_of(open.files.folder);
+    window.planned_cuts_file = open.files.folder / kPlannedCutsFile;
     window.stereo.mode = p.stereo;
     window.stereo.base_mm = p.stereo_base;
     window.camera_trial = p.experiment == "camera";

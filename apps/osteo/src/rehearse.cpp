@@ -124,7 +124,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.anatomy = anatomy_of(the_case, options.haptics, io.context);
   World world = p.resume.empty() ? world_of(the_case, options.anatomy)
                                  : world_at_end(open_session_folder(p.resume, the_case.folder), the_case, options.anatomy, io.context);
-  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds) : load_script(p.script);
+  const Script script = p.script.empty() ? make_default_script(world, p.side == Side::left, tool, p.seconds)
+                                         : load_script(p.script, planned_cuts_of(the_case.folder));
   const std::vector<std::string> doubts = doubts_about(script, world, p.dust);
   for (const std::string& d : doubts) io.context.warn(d);
   if (!p.dust && (p.position != Posture::supine || p.head_turned_deg != 0))

@@ -53,9 +53,9 @@ cli::CommandInfo TutorCommand::info() {
 }
 
 int TutorCommand::run(const Params& p, cli::Invocation& io) {
-  const Script script = load_script(p.script);
-  if (!script.more_hands.empty()) throw Error(ExitCode::usage, "'" + p.script + "' has more hands than one", "the second is the trainee's");
   const Case the_case = load_case(io.arguments[0]);
+  const Script script = load_script(p.script, planned_cuts_of(the_case.folder));
+  if (!script.more_hands.empty()) throw Error(ExitCode::usage, "'" + p.script + "' has more hands than one", "the second is the trainee's");
   RehearsalOptions options;
   options.haptics.device = SpringHand::traits();
   options.haptics.more_devices = {SpringHand::traits()};

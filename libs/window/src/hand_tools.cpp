@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "keys.h"
+#include "osteo/base/error.h"
+#include "osteo/base/files.h"
 #include "osteo/bone/plate_fit.h"
 #include "osteo/bone/plates.h"
 
@@ -48,6 +50,7 @@ void HandTools::renew(Vec3 centre_mm, double size_mm) {
   handle_mm_ = centre_mm;
   cut_ = SawCut{};
   cut_.at_mm = centre_mm;
+  within_mm_ = kGuideMm;
   saw_in_hand_ = false;
   note_.clear();
 }
@@ -60,6 +63,33 @@ void HandTools::choose(Tool tool, Rehearsal& rehearsal, const ViewAxes& view) {
   note_.clear();
   if (tool == Tool::saw) aim_saw(view, false);
   if (tool == Tool::plate) grip(rehearsal);
+}
+
+void HandTools::plan(std::vector<PlannedCut> cuts, std::filesystem::path file) {
+  planned_ = std::move(cuts);
+  planned_file_ = std::move(file);
+}
+
+void HandTools::choose_planned(std::size_t cut) {
+  cut_ = planned_[cut].cut;
+  within_mm_ = planned_[cut].within_mm;
+  note_ = "saw at the planned cut '" + planned_[cut].name + "'";
+}
+
+void HandTools::keep_planned(const std::string& name) {
+  try {
+    if (name.empty()) throw Error(ExitCode::usage, "a planned cut needs a name");
+    auto cuts = std::filesystem::exists(planned_file_) ? load_planned_cuts(planned_file_) : std::vector<PlannedCut>{};
+    for (const PlannedCut& c : cuts) {
+      if (c.name == name) throw Error(ExitCode::usage, "there is a planned cut '" + name + "' already");
+    }
+    cuts.push_back({name, cut_, within_mm_});
+    write_file(planned_file_, planned_cuts_json(cuts));
+    planned_ = std::move(cuts);
+    note_ = "kept as '" + name + "' in " + planned_file_.string();
+  } catch (const Error& e) {
+    note_ = e.what();
+  }
 }
 
 void HandTools::take_saw(Rehearsal& rehearsal) {

@@ -1,11 +1,14 @@
 // What the hand can do besides drilling: saw, move pieces, fix plates. Private to libs/window; no ImGui, no VTK.
 #pragma once
+#include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "keys.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/session/planned_cuts.h"
 
 namespace osteo {
 
@@ -42,7 +45,15 @@ class HandTools {
   /// While the hand is led somewhere the guide does not hold its saw.
   void loosen_saw(bool loose, Rehearsal& rehearsal);
   [[nodiscard]] bool saw_in_hand() const { return saw_in_hand_; }
-  [[nodiscard]] CuttingGuide guide() const { return {cut_.at_mm, normalized(cut_.normal), kGuideMm}; }
+  [[nodiscard]] CuttingGuide guide() const { return {cut_.at_mm, normalized(cut_.normal), within_mm_}; }
+
+  /// Cuts that were planned before, to choose from, and the file that one kept here is added to.
+  void plan(std::vector<PlannedCut> cuts, std::filesystem::path file);
+  [[nodiscard]] std::span<const PlannedCut> planned() const { return planned_; }
+  /// The saw there, and its guide as that says.
+  void choose_planned(std::size_t cut);
+  /// The saw's plane as it is now, as a planned cut of that name: into the file, beside what it holds by now. note() says what came of it.
+  void keep_planned(const std::string& name);
 
   /// Of the saw. Another one: as set in a panel.
   [[nodiscard]] const SawCut& cut() const { return cut_; }
@@ -87,6 +98,9 @@ class HandTools {
   std::size_t plate_ = 0;
   float turn_deg_ = 0, tilt_deg_ = 0;
   bool saw_in_hand_ = false;
+  std::vector<PlannedCut> planned_;
+  std::filesystem::path planned_file_;
+  double within_mm_ = kGuideMm;
   std::string note_;
 };
 

@@ -30,6 +30,7 @@ RehearsalWindow::RehearsalWindow(WindowShell& shell, PersonSettings& person, con
       end_page_(options.end_page),
       window_(shell.window()) {
   cuts_.set_case(options.ct, hu, options.bone);
+  control_.tools().plan(options.planned_cuts, options.planned_cuts_file);
   stereo_.params = options.stereo;
   open();
   painter_ = std::make_unique<ScenePainter>(render_window_, renderer_);

@@ -23,7 +23,7 @@ namespace {
 
 using Tool = HandTools::Tool;
 
-void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
+void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, std::array<char, 64>& plan_name) {
   SawCut cut = tools.cut();
   const auto slider = [](const char* name, double& mm, float least, float most, const char* format) {
     float value = static_cast<float>(mm);
@@ -33,12 +33,25 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
   slider("long", cut.length_mm, 0, 150, cut.length_mm > 0 ? "%.0f mm" : "through");
   slider("deep", cut.depth_mm, 0, 150, cut.depth_mm > 0 ? "%.0f mm" : "through");
   tools.set_cut(cut);
+  if (!tools.planned().empty()) ImGui::SetNextItemWidth(-1);
+  if (!tools.planned().empty() && ImGui::BeginCombo("##planned", "planned cuts")) {
+    for (std::size_t i = 0; i < tools.planned().size(); ++i) {
+      if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
+    }
+    ImGui::EndCombo();
+  }
   if (ImGui::Button("as I see it")) tools.aim_saw(view, false);
   ImGui::SameLine();
   if (ImGui::Button("flat")) tools.aim_saw(view, true);
   if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
   if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::InputTextWithHint("##plan", "keep as planned: name, Enter", plan_name.data(), plan_name.size(),
+                               ImGuiInputTextFlags_EnterReturnsTrue)) {
+    tools.keep_planned(plan_name.data());
+    plan_name.fill(0);
+  }
 }
 
 void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
@@ -129,7 +142,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     const bool held = tools.tool() == tool && !tools.saw_in_hand();
     if (ImGui::RadioButton(name, held) && !held) tools.choose(tool, rehearsal, view);
   }
-  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view);
+  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, plan_name_);
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
   if (tools.tool() == Tool::plate) {
     plate_panel(tools, rehearsal);

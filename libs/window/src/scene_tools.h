@@ -41,6 +41,7 @@ class SceneTools {
   vtkSmartPointer<vtkPolyData> plane_data_;
   PlateView hand_plate_;
   double hand_in_bone_mm_ = 0;
+  std::array<char, 64> plan_name_{};
 };
 
 }  // namespace osteo

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "bar.h"
+#include "osteo/base/files.h"
 #include "scratch.h"
 
 namespace osteo {
@@ -133,6 +134,50 @@ TEST(RehearsalControl, ZTakesBackTheLastStrokeAndThenTheCut) {
   std::string note;
   ASSERT_TRUE(frames_until(control, [&] { return !(note = control.tools().note(control.rehearsal())).empty(); }));
   EXPECT_EQ(note, "undo: there is nothing to take back");
+  sitting.running->stop();
+}
+
+TEST(RehearsalControl, APlannedCutIsChosenAndOneIsKept) {
+  const test::ScratchFolder scratch;
+  const auto file = scratch.path() / kPlannedCutsFile;
+  write_file(file, planned_cuts_json(std::vector<PlannedCut>{{"body", {{8, 0, 0}, {2, 0, 0}, {0, 0, 1}, 1}, 1.5}}));
+  Sitting sitting;
+  RehearsalControl control = sitting.control();
+  control.look_from(kFromAbove);
+  HandTools& tools = control.tools();
+  tools.plan(planned_cuts_of(scratch.path()), file);
+  ASSERT_TRUE(control.begin(true, false));
+  ASSERT_EQ(tools.planned().size(), 1u);
+  press(control, Command::saw);
+  tools.choose_planned(0);
+  EXPECT_EQ(tools.note(control.rehearsal()), "saw at the planned cut 'body'");
+  tools.take_saw(control.rehearsal());
+  ASSERT_TRUE(frames_until(control, [&] { return of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
+  EXPECT_EQ(of_world(control, [](const World& w) { return w.cutting_guide(); }), (CuttingGuide{{8, 0, 0}, {1, 0, 0}, 1.5}));
+  tools.put_saw_away(control.rehearsal());
+  // Another beside it, where meanwhile somebody added a third.
+  write_file(file, planned_cuts_json(std::vector<PlannedCut>{tools.planned()[0], {"theirs", {{1, 2, 3}, {0, 1, 0}}, 2}}));
+  SawCut cut = tools.cut();
+  cut.at_mm = {-4, 0.1, 1.0 / 3};
+  tools.set_cut(cut);
+  tools.keep_planned("ramus");
+  const auto kept = load_planned_cuts(file);
+  ASSERT_EQ(kept.size(), 3u);
+  EXPECT_EQ(kept[1].name, "theirs");
+  EXPECT_EQ(kept[2].name, "ramus");
+  EXPECT_EQ(kept[2].cut.at_mm, cut.at_mm) << "to the last bit";
+  EXPECT_EQ(tools.planned().size(), 3u);
+  // A name twice, none, a folder that is not there: said, and the file stays as it is.
+  const std::string before = read_text(file);
+  tools.keep_planned("ramus");
+  EXPECT_EQ(tools.note(control.rehearsal()), "there is a planned cut 'ramus' already");
+  tools.keep_planned("");
+  EXPECT_EQ(tools.note(control.rehearsal()), "a planned cut needs a name");
+  EXPECT_EQ(read_text(file), before);
+  tools.plan({}, scratch.path() / "gone" / "x.json");
+  tools.keep_planned("lost");
+  EXPECT_NE(tools.note(control.rehearsal()).find("gone"), std::string::npos) << tools.note(control.rehearsal());
+  EXPECT_TRUE(tools.planned().empty());
   sitting.running->stop();
 }
 

@@ -12,6 +12,7 @@
 #include "osteo/data/volume.h"
 #include "osteo/dicom/verdict.h"
 #include "osteo/scene/rehearsal.h"
+#include "osteo/session/planned_cuts.h"
 #include "osteo/view/planned_regions.h"
 #include "osteo/view/quality.h"
 #include "osteo/window/monitor_desk.h"
@@ -35,8 +36,10 @@ struct WindowOptions {
   bool approval_ended = false;   ///< by a later change: said in another colour
   std::vector<SparseGrid> bone;  ///< density as the case has it, the finest first: cuts show what is missing of it; empty: they do not
   std::optional<Image> ct;       ///< the scan of the case, for its cuts; none: they show what the case keeps of it
-  std::vector<PlannedRegion> regions;  ///< of a procedure, to be outlined; those of structures that the case lacks are told
-  std::vector<Vec3> way;               ///< of a recorded hand that leads; drawn; empty: none does
+  std::vector<PlannedRegion> regions;       ///< of a procedure, to be outlined; those of structures that the case lacks are told
+  std::vector<PlannedCut> planned_cuts;     ///< to choose from
+  std::filesystem::path planned_cuts_file;  ///< that a cut kept as planned is added to
+  std::vector<Vec3> way;                    ///< of a recorded hand that leads; drawn; empty: none does
   StereoParams stereo;
   bool review_only = false;          ///< a session that is over is shown: the page at the end, and nothing that begins another
   bool camera_trial = false;         ///< views to bring the camera to are shown and timed; camera-trial.csv in the session's folder
