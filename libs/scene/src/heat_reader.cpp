@@ -7,6 +7,7 @@
 
 #include "osteo/base/param.h"
 #include "osteo/bone/instrument.h"
+#include "osteo/haptics/saw_slot.h"
 
 namespace osteo {
 namespace {
@@ -82,6 +83,7 @@ void HeatReader::begin(const World& world) {
   for (const auto& b : bodies_) retire(*b);
   bodies_.clear();
   for (const PlacedBody& placed : world.bodies()) bodies_.push_back(body_of(placed));
+  for (std::uint32_t hand = 0; hand < guides_.size(); ++hand) guides_[hand] = world.cutting_guide(hand);
   std::stable_sort(bodies_.begin(), bodies_.end(), [](const auto& a, const auto& b) { return a->of_region && !b->of_region; });
   double longest_s = 0.2;
   for (const auto& b : bodies_) longest_s = std::min(longest_s, b->field->longest_step_s());
@@ -143,6 +145,7 @@ void HeatReader::scene_changed(const World& world, const World::Effect& effect) 
 
 void HeatReader::action(const SceneAction& action) {
   if (action.is(ActionKind::irrigate)) water_ = action;
+  if (action.is(ActionKind::cutting_guide) && action.hand < guides_.size()) guides_[action.hand] = action.guide();
   if (!row_of(action).changes_world) return;
   if (applied_early_ > 0) {
     --applied_early_;
@@ -227,7 +230,9 @@ void HeatReader::heat(const TickRecord& record) {
   }
   // Along the blade, wherever there is bone at it.
   constexpr int kPlaces = 6;
-  const Vec3 along = normalized(from_floats(record.device.axis)) * (held.head.length_mm / (kPlaces - 1));
+  const CuttingGuide none;
+  const CuttingGuide& guide = record.hand < guides_.size() ? guides_[record.hand] : none;
+  const Vec3 along = tool_axis(record, guide) * (held.head.length_mm / (kPlaces - 1));
   std::array<bool, kPlaces> in{};
   for (int n = 0; n < kPlaces; ++n)
     in[static_cast<std::size_t>(n)] = std::any_of(bodies_.begin(), bodies_.end(), [&](const auto& b) {

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "check.h"
-#include "distributions.h"
+#include "osteo/statistics/distributions.h"
 
 namespace osteo::statistics {
 

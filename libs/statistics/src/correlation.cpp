@@ -7,7 +7,7 @@
 #include <Eigen/Dense>
 
 #include "check.h"
-#include "distributions.h"
+#include "osteo/statistics/distributions.h"
 
 namespace osteo::statistics {
 namespace {

@@ -1,4 +1,4 @@
-#include "distributions.h"
+#include "osteo/statistics/distributions.h"
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>

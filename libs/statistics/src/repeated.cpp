@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "check.h"
-#include "distributions.h"
+#include "osteo/statistics/distributions.h"
 #include "permute.h"
 
 namespace osteo::statistics {

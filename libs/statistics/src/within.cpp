@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "check.h"
-#include "distributions.h"
+#include "osteo/statistics/distributions.h"
 
 namespace osteo::statistics {
 

@@ -14,6 +14,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/parallel.h"
 #include "osteo/base/param.h"
+#include "osteo/statistics/distributions.h"
 #include "osteo/tissue/dynamics.h"
 #include "osteo/tissue/implicit.h"
 
@@ -235,12 +236,6 @@ Linear linear_fit(const Trace& trace, const MeasuredMotion& used, double later, 
     r.of_channels.push_back(l[3] - a * l[1]);
   }
   return r;
-}
-
-// Student's t beyond which 2.5 % lie (R. Fisher, E. Cornish 1960).
-double student_975(double freedom) {
-  const double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z;
-  return z + (z3 + z) / (4 * freedom) + (5 * z5 + 16 * z3 + 3 * z) / (96 * freedom * freedom);
 }
 
 MeasuredMotion from_release(const MeasuredMotion& motion, double release_s) {
@@ -484,7 +479,7 @@ DampingFit fit_damping(const TissueModel& model, const TissueLoad& pluck, std::s
   fit.correlation = left > 0 ? std::clamp(next / left, -0.99, 0.99) : 0;
   const double freedom = std::max(1.0, static_cast<double>(values) - static_cast<double>(m));
   const double variance = left / freedom * (fit.correlation > 0 ? (1 + fit.correlation) / (1 - fit.correlation) : 1);
-  const double wide = student_975(freedom);
+  const double wide = statistics::student_quantile(0.975, freedom);
   const auto error = [&](std::size_t parameter) {
     const auto place = std::find(free.begin(), free.end(), static_cast<Eigen::Index>(parameter));
     if (place == free.end()) return 0.0;

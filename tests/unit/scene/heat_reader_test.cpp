@@ -117,6 +117,19 @@ TEST(HeatReader, ASawHeatsAlongItsBlade) {
   EXPECT_NEAR(heat.ledger().added_j, params.cutting_share * 4 * metres, 1e-9);
   for (const double x : {-5.0, 0.0, 5.0, 10.0}) EXPECT_GT(heat.celsius_at({x, 0, 3.5}), 37.5) << x;
   EXPECT_LT(heat.celsius_at({-12, 0, 3.5}), 37.5) << "ahead of the tip";
+  // In a guide its blade lies in the plane, however the hand holds it.
+  HeatReader held(world, nullptr, 1000, params);
+  held.resync(world);
+  held.action(SceneAction::cutting_guide({{0, 0, 4.4}, {0, 0, 1}, 2}));
+  TickRecord tilted = t;
+  tilted.device.axis = {0.88F, 0, 0.475F};
+  tilted.flags |= kInSlot;
+  for (tilted.tick = 0; tilted.tick < 1000; ++tilted.tick) held.tick(tilted, {});
+  for (const double x : {-5.0, 0.0, 5.0, 10.0}) EXPECT_NEAR(held.celsius_at({x, 0, 3.5}), heat.celsius_at({x, 0, 3.5}), 1e-9) << x;
+  HeatReader loose(world, nullptr, 1000, params);
+  loose.resync(world);
+  for (tilted.tick = 0; tilted.tick < 1000; ++tilted.tick) loose.tick(tilted, {});
+  EXPECT_LT(loose.celsius_at({10, 0, 3.5}), 37.2) << "without one it points away from the bone";
   // At rest it heats nothing.
   t.speed_rpm = 0;
   const double before = heat.ledger().added_j;

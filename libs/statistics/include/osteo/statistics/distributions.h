@@ -1,4 +1,4 @@
-// The distributions, from Boost.Math; its headers are slow to compile, so they are in one file.
+// Distributions of statistics, by Boost.Math (in one source file: its headers are slow to compile).
 #pragma once
 
 namespace osteo::statistics {
