@@ -168,7 +168,6 @@ TEST(ShadingField, CutsEdgesAndThinWallsStayWhatTheyAre) {
   // Edges of 90 and 60 degrees: a millimetre from the edge the faces are flat again, and at the edge the light turns within it.
   for (const double angle : {90.0, 60.0}) {
     const double half = angle / 2 / 57.29578;
-    const Vec3 a{std::cos(half), std::sin(half), 0}, b{std::cos(half), -std::sin(half), 0};
     // A wedge whose edge is the z axis turned a little; its faces look to +y and -y.
     const Solid wedge{[=](Vec3 p) {
       const Vec3 q{p.x + 3 + 0.1 * p.z, p.y + 0.07, p.z};

@@ -16,7 +16,7 @@ struct NetworkFaults {
 
 class SimNetwork {
  public:
-  explicit SimNetwork(const NetworkFaults& faults, std::uint64_t seed = 1) : faults(faults), state_(seed) {}
+  explicit SimNetwork(const NetworkFaults& wanted, std::uint64_t seed = 1) : faults(wanted), state_(seed) {}
   void send(const Bytes& packet, std::int64_t now_us) {
     ++sent;
     bytes += packet.size();

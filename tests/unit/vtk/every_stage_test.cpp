@@ -293,8 +293,8 @@ TEST_P(EveryStage, IsAVtkFilterThatGivesWhatTheStageGives) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Registry, EveryStage, testing::ValuesIn(osteo_stages().names()), [](const auto& info) {
-  std::string name = info.param;
+INSTANTIATE_TEST_SUITE_P(Registry, EveryStage, testing::ValuesIn(osteo_stages().names()), [](const auto& of) {
+  std::string name = of.param;
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 });

@@ -67,10 +67,10 @@ struct NodeResult {
   std::string id, stage, key;
   bool reused = false;  ///< nothing was done: the outputs were there, unchanged
   double seconds = 0;
-  Report report;
-  std::map<std::string, std::string> params;
-  std::map<std::string, std::filesystem::path> outputs;
-  std::map<std::string, std::string> output_hashes;
+  Report report{};
+  std::map<std::string, std::string> params{};
+  std::map<std::string, std::filesystem::path> outputs{};
+  std::map<std::string, std::string> output_hashes{};
 };
 
 /// Validates and runs. Beside each output FILE it writes FILE.prov.json: program, stage, parameters, hashes of inputs and

@@ -14,14 +14,14 @@ namespace osteo {
 
 /// Kept in the manifest. It holds no paths and no UIDs, since those may name the patient: files are known by the hashes of their content.
 struct Recipe {
-  std::string source_hash;      ///< of the scan
-  std::string structures_hash;  ///< of the label map; empty: none was given
-  std::string pipeline_hash;    ///< of the pipeline file; empty: the built-in one
-  std::string edits_hash;       ///< of edits.json, which lies in the case; empty: nothing was corrected by hand
+  std::string source_hash{};      ///< of the scan
+  std::string structures_hash{};  ///< of the label map; empty: none was given
+  std::string pipeline_hash{};    ///< of the pipeline file; empty: the built-in one
+  std::string edits_hash{};       ///< of edits.json, which lies in the case; empty: nothing was corrected by hand
   /// Variable of the pipeline, or ID.PARAMETER -> text: only what was asked for. The rest is as the pipeline has it.
   std::map<std::string, std::string> settings;
-  std::set<std::string> withheld;  ///< those of `settings` whose values may name the patient
-  std::set<std::string> lost;      ///< withheld ones whose values this machine does not know
+  std::set<std::string> withheld{};  ///< those of `settings` whose values may name the patient
+  std::set<std::string> lost{};      ///< withheld ones whose values this machine does not know
   friend bool operator==(const Recipe&, const Recipe&) = default;
 };
 

@@ -12,7 +12,7 @@ namespace osteo::study {
 struct AnalysisSettings {
   double level = 0.95;
   int resamples = 2000;
-  std::vector<std::string> given;  ///< metrics that correlations are also told without: partial ones
+  std::vector<std::string> given{};  ///< metrics that correlations are also told without: partial ones
 };
 /// Everything the report says is in `json`; what there is too little for is in it under "refused", with the reason.
 struct Analysis {
