@@ -14,9 +14,9 @@
 namespace osteo {
 namespace {
 
-constexpr int kMostSteps = 200;          // of an update: beside SoftBody::kMostWork
-constexpr double kToolStiffness = 0.1;   // N/mm of each place that the tool meets
-constexpr double kBoneStiffness = 0.3;   // and of each point that meets bone
+constexpr int kMostSteps = 200;         // of an update: beside SoftBody::kMostWork
+constexpr double kToolStiffness = 0.1;  // N/mm of each place that the tool meets
+constexpr double kBoneStiffness = 0.3;  // and of each point that meets bone
 constexpr double kLeastPushN = 1e-4;
 constexpr double kFeltStiffness = 0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
 constexpr double kDampingPerS = 150;     // tissue does not ring

@@ -141,7 +141,8 @@ std::shared_ptr<SoftTissue> soft_tissue_of(const fs::path& folder) {
   if (const fs::path more = folder / "tissue"; output_exists(more)) {
     std::set<fs::path> listed;
     try {
-      if (!fs::is_directory(more)) throw Error(ExitCode::usage, "'" + more.string() + "' is no folder of soft tissue", "remove or rename it");
+      if (!fs::is_directory(more))
+        throw Error(ExitCode::usage, "'" + more.string() + "' is no folder of soft tissue", "remove or rename it");
       for (const auto& e : fs::directory_iterator(more)) {
         if (e.path().filename().string().starts_with('.')) continue;  // what file managers leave
         if (!e.is_directory())

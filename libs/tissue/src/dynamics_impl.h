@@ -37,8 +37,8 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Plane> planes;
   // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
   // too.
-  std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
-  std::vector<std::uint32_t> triangles_of;                 // of each point: how many; 0 inside the body
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // facing outwards
+  std::vector<std::uint32_t> triangles_of;              // of each point: how many; 0 inside the body
   // Of a tool and a triangle, from when it was met until it has been left.
   struct Touch {
     bool on = false;      // met, and from outside
@@ -50,12 +50,12 @@ struct TissueDynamics<Real>::Impl {
     RigidContact contact;
     std::vector<RigidShape::Ball> balls;
     std::vector<std::uint32_t> near_triangles, near_points;  // those that it may reach before they are looked for again
-    std::vector<Touch> touches;  // one a triangle; empty: it meets none
-    Vec3 force;                  // on it
+    std::vector<Touch> touches;                              // one a triangle; empty: it meets none
+    Vec3 force;                                              // on it
     int met = 0;
   };
   std::vector<Tool> tools;
-  double crowd = 1;  // tools that may reach the body
+  double crowd = 1;   // tools that may reach the body
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
   std::uint64_t steps = 0, tool_steps = 0, since_certified = 0;
   std::unique_ptr<tissue::Cutter> cutter;  // once something was cut

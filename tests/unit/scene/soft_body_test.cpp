@@ -168,8 +168,7 @@ TEST(SoftBody, BoneCarriesIt) {
     SoftBody soft(m, problem);
     if (bone) soft.meet(&world);
     const std::size_t burr = static_cast<std::size_t>(burr_index(BurrKind::diamond, 6));
-    for (int n = 0; n < 100; ++n)
-      update(soft, {{shift.x + 20, middle.y, top + 9.3 + 3 - 0.06 * std::min(n, 80)}, {0, 0, 1}, burr, false});
+    for (int n = 0; n < 100; ++n) update(soft, {{shift.x + 20, middle.y, top + 9.3 + 3 - 0.06 * std::min(n, 80)}, {0, 0, 1}, burr, false});
     double z = 1e9;
     for (const Vec3& p : soft.points_mm()) z = std::min(z, p.z);
     return z - top;

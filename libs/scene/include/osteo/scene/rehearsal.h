@@ -44,9 +44,9 @@ struct ActionNote {
 
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
-  double removed_mm3 = 0;  ///< by the burr
-  double sawn_mm3 = 0;     ///< by the saw, and crumbs of splits
-  double tissue_mm3 = 0;   ///< soft tissue cut off, as at rest
+  double removed_mm3 = 0;                 ///< by the burr
+  double sawn_mm3 = 0;                    ///< by the saw, and crumbs of splits
+  double tissue_mm3 = 0;                  ///< soft tissue cut off, as at rest
   std::vector<SoftTissue::Facts> tissue;  ///< each body; empty where the scene has none
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
@@ -179,7 +179,7 @@ class Rehearsal {
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
   std::vector<ActionNote> notes_;
-  std::uint64_t soft_tick_ = 0;           // of the next update of soft tissue
+  std::uint64_t soft_tick_ = 0;          // of the next update of soft tissue
   std::deque<SceneAction> soft_pushes_;  // of the last one, that the servo has not got yet: one a tick
   std::atomic<bool> stop_{false}, elsewhere_{false};
   std::deque<SceneAction> done_elsewhere_;  // whose tick has come

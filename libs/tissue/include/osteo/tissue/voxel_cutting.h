@@ -26,8 +26,8 @@ class VoxelCutting {
   /// `model` must outlive it; all voxels are of `voxel_mm3`.
   VoxelCutting(const TissueModel& model, double voxel_mm3);
 
-  /// The tool may take `mm3` more; `number`: of several, each with what it has saved. True when something was cut off `body`, whose tetrahedra are the model's. O(voxels), and O(constraints)
-  /// when something goes.
+  /// The tool may take `mm3` more; `number`: of several, each with what it has saved. True when something was cut off `body`, whose
+  /// tetrahedra are the model's. O(voxels), and O(constraints) when something goes.
   bool cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number = 0);
 
   [[nodiscard]] const std::vector<bool>& gone() const { return gone_; }  ///< one a tetrahedron
