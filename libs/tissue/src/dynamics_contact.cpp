@@ -15,19 +15,12 @@ void TissueDynamics<Real>::set_tool(RigidContact contact, std::size_t number) {
   Impl& m = *impl_;
   if (number >= m.tools.size()) m.tools.resize(number + 1);
   auto& tool = m.tools[number];
-  const std::shared_ptr<const RigidShape> before = std::exchange(tool.contact, std::move(contact)).shape;
+  tool.contact = std::move(contact);
   tool.balls = tool.contact.shape ? tool.contact.shape->balls() : std::vector<RigidShape::Ball>{};
   tool.force = {};
   tool.met = 0;
+  if (!tool.contact.shape) tool.touches.clear();
   m.tool_steps = 0;
-  if (tool.touches.empty()) return;
-  // One that jumps comes from elsewhere, and holds nothing.
-  if (!before || !tool.contact.shape) {
-    tool.touches.clear();
-  } else {
-    const RigidShape::Ball was = before->bounds(), is = tool.contact.shape->bounds();
-    if (!(length(is.centre_mm - was.centre_mm) < 2 * is.radius_mm)) tool.touches.clear();
-  }
 }
 
 template <class Real>
@@ -93,7 +86,11 @@ void TissueDynamics<Real>::Impl::find_near(Tool& tool) {
     if (mass[p] > 0 && close(p) && !(cutter && cutter->tets_of_point(p) == 0)) tool.near_points.push_back(p);
   }
   for (std::uint32_t t = 0; t < triangles.size() && !tool.balls.empty(); ++t) {
-    if (close(triangles[t][0])) tool.near_triangles.push_back(t);
+    if (close(triangles[t][0])) {
+      tool.near_triangles.push_back(t);
+    } else if (!tool.touches.empty()) {
+      tool.touches[t].on = false;
+    }
   }
 }
 

@@ -40,8 +40,7 @@ class TissueDynamics {
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
   /// Pushes, at each step, the surface's triangles where they are nearest to it (a shape without balls: points only), and points inside the
   /// body that it meets. Its stiffness is that of each triangle or point; where several tools are near, each has its part of what the step
-  /// leaves room for. `number`: of several tools, from 0. A tool that goes further than its own size between two calls holds nothing any
-  /// more.
+  /// leaves room for. `number`: of several tools, from 0.
   void set_tool(RigidContact tool, std::size_t number = 0);
   /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point. Points that lie in
   /// it at rest may stay as deep.
