@@ -137,7 +137,7 @@ class Stepped {
     anatomy_ = options.anatomy;
     World world = resume.empty() ? world_of(*the_case, options.anatomy)
                                  : world_at_end(open_session_folder(resume, the_case->folder), *the_case, options.anatomy, context_);
-    if (std::filesystem::exists(the_case->folder / "tissue.vtu"))
+    if (std::filesystem::exists(the_case->folder / "tissue.vtu") || std::filesystem::exists(the_case->folder / "tissue"))
       context_.warn("the case's soft tissue is left out: only 'osteo rehearse' moves it");
     if (!out.empty()) {
       session_ = create_session_folder(out, the_case->folder, resume);

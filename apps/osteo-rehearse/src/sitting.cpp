@@ -120,7 +120,7 @@ HandGoal Sitting::begin(bool from_case, const HandView& view) {
   options_.haptics.device = devices.front()->traits();
   options_.haptics.more_devices.clear();
   for (std::size_t h = 1; h < devices.size(); ++h) options_.haptics.more_devices.push_back(devices[h]->traits());
-  options_.soft = soft_body_of(case_.folder);
+  options_.soft = soft_tissue_of(case_.folder);
   run(std::move(world), std::move(devices), session.resumed_from,
       live_.hosts() ? "live tutoring: the second hand is a trainee's, far away" : "");
   return start;

@@ -146,7 +146,7 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   options.follow = {true, p.pieces, p.dust, p.heat};
   options.actions = first_actions(p);
   for (SceneAction& a : actions_of(script, p.rate_hz)) options.actions.push_back(a);
-  options.soft = soft_body_of(the_case.folder);
+  options.soft = soft_tissue_of(the_case.folder);
   options.haptics.more_devices.assign(script.more_hands.size(), SpringHand::traits());
   const bool tracked = p.device == Hand::igtl;
   std::vector<std::unique_ptr<Device>> devices = devices_of(script, p.rate_hz);
@@ -244,6 +244,8 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
   if (!io.common.quiet) {
     io.err << "case: " << approval.words() << '\n' << told_hardness(options.anatomy) << '\n';
     io.err << "drilled " << s.ticks << " ticks; removed " << format_number(std::round(s.removed_mm3 * 10) / 10) << " mm3\n";
+    for (const SoftTissue::Facts& f : s.tissue)
+      io.err << "soft tissue '" << f.name << "': " << format_number(std::round(f.cut_off_mm3 * 10) / 10) << " mm3 cut off\n";
     rehearsal.look([&](const World&, SceneReaders& readers) {
       if (!readers.heat) return;
       for (const std::string& line : told(*readers.heat, rehearsal.structures())) io.err << line << '\n';

@@ -30,6 +30,9 @@ cli::CommandInfo SceneCommand::info() {
 
 namespace {
 
+std::string percent(double share) {
+  return format_number(std::round(100 * share)) + " %";
+}
 double rounded(double value, double steps_per_unit) {
   return std::round(value * steps_per_unit) / steps_per_unit;
 }
@@ -66,6 +69,7 @@ class SceneCosts {
                     part.thread.c_str());
       out << line;
     }
+    for (const std::string& line : tissue_lines_) out << line << '\n';
     out << "together " << format_number(rounded(megabytes_, 10)) << " MB; a tick while drilling takes "
         << format_number(ticks_.quantile_us(0.5)) << " us, p99 " << format_number(ticks_.quantile_us(0.99)) << " us, p99.9 "
         << format_number(ticks_.quantile_us(0.999)) << " us\n"
@@ -83,8 +87,10 @@ class SceneCosts {
   void timed(const std::string& name, const std::string& thread, const auto& make) {
     const std::int64_t begin = monotonic_ns();
     const std::size_t bytes = make();
-    parts_.push_back(
-        {name, thread, rounded(static_cast<double>(bytes) / 1e6, 100), rounded(static_cast<double>(monotonic_ns() - begin) / 1e9, 100)});
+    add_part(name, thread, bytes, static_cast<double>(monotonic_ns() - begin) / 1e9);
+  }
+  void add_part(const std::string& name, const std::string& thread, std::size_t bytes, double made_in_s) {
+    parts_.push_back({name, thread, rounded(static_cast<double>(bytes) / 1e6, 100), rounded(made_in_s, 100)});
     const Part& p = parts_.back();
     megabytes_ += p.memory_mb;
     j_["parts"].push_back({{"part", p.name}, {"memory_mb", p.memory_mb}, {"made_in_s", p.made_in_s}, {"kept_up_to_date_by", p.thread}});
@@ -135,24 +141,46 @@ class SceneCosts {
     }
   }
 
+  // Each body by itself, and what is left to it while all of them move.
   void build_tissue() {
-    if (!fs::exists(case_.folder / "tissue.vtu")) return;
-    std::shared_ptr<SoftBody> soft;
-    timed("soft tissue", "follower", [&] {
-      soft = soft_body_of(case_.folder);
-      return soft->memory_bytes();
-    });
-    if (soft->slow_motion() < 0.99)
-      context_.warn("soft tissue runs at " + format_number(std::round(100 * soft->slow_motion())) +
-                    " % of real time: it will feel sluggish; larger voxels make it quicker");
+    std::shared_ptr<SoftTissue> soft;
+    const std::int64_t made_from = monotonic_ns();
+    soft = soft_tissue_of(case_.folder);
+    if (!soft) return;
+    const double made_in_s = static_cast<double>(monotonic_ns() - made_from) / 1e9 / static_cast<double>(soft->size());
     soft->meet(&*world_);
-    const SoftTool tool{soft->points_mm().front(), {0, 0, 1}, 0, false};
     constexpr int kUpdates = 20;
-    const std::int64_t begin = monotonic_ns();
-    for (int n = 0; n < kUpdates; ++n) static_cast<void>(soft->update(tool));
-    const double ms = static_cast<double>(monotonic_ns() - begin) / 1e6 / kUpdates;
+    const auto update_ms = [](const auto& update) {
+      const std::int64_t from = monotonic_ns();
+      for (int n = 0; n < kUpdates; ++n) update();
+      return static_cast<double>(monotonic_ns() - from) / 1e6 / kUpdates;
+    };
+    const auto at_rest = [&](std::size_t n) { return SoftTool{soft->body(n).points_mm().front(), {0, 0, 1}, 0, false}; };
+    Json bodies = Json::list();
+    std::vector<double> alone(soft->size());
+    for (std::size_t n = 0; n < soft->size(); ++n) {
+      SoftBody& body = soft->body(n);
+      add_part("soft tissue '" + soft->name(n) + "'", "follower, while it moves", body.memory_bytes(), made_in_s);
+      const SoftTool tool = at_rest(n);
+      const double ms = update_ms([&] { static_cast<void>(body.update({&tool, 1})); });
+      alone[n] = body.slow_motion();
+      bodies.push_back({{"name", soft->name(n)}, {"update_ms", ms}, {"of_real_time", alone[n]}});
+      if (alone[n] < 0.99)
+        context_.warn("soft tissue '" + soft->name(n) + "' runs at " + percent(alone[n]) +
+                      " of real time: it will feel sluggish; larger voxels make it quicker");
+    }
+    soft->meet(&*world_);  // all of it awake
+    const SoftTool tool = at_rest(0);
+    const double ms = update_ms([&] { static_cast<void>(soft->update({&tool, 1})); });
+    const std::vector<SoftTissue::Facts> facts = soft->facts();
     soft->meet(nullptr);
-    j_["soft_tissue"] = {{"update_ms", ms}, {"updates_per_s", SoftBody::kUpdatesPerS}, {"of_real_time", soft->slow_motion()}};
+    double least = 1;
+    for (std::size_t n = 0; n < facts.size(); ++n) {
+      least = std::min(least, facts[n].of_real_time);
+      tissue_lines_.push_back("soft tissue '" + facts[n].name + "': " + percent(alone[n]) + " of real time" +
+                              (facts.size() > 1 ? ", " + percent(facts[n].of_real_time) + " while all of it moves" : std::string()));
+    }
+    j_["soft_tissue"] = {{"update_ms", ms}, {"updates_per_s", SoftBody::kUpdatesPerS}, {"of_real_time", least}, {"bodies", bodies}};
     if (ms > 1000 / SoftBody::kUpdatesPerS)
       context_.warn("an update of soft tissue takes " + format_number(rounded(ms, 10)) + " ms of the " +
                     format_number(1000 / SoftBody::kUpdatesPerS) + " it has");
@@ -205,6 +233,7 @@ class SceneCosts {
   const Context& context_;
   Json j_;
   std::vector<Part> parts_;
+  std::vector<std::string> tissue_lines_;
   double megabytes_ = 0;
   std::optional<World> world_;
   HapticSetup setup_;

@@ -51,7 +51,10 @@ Rehearsal::Rehearsal(World world, std::vector<std::unique_ptr<Device>> devices, 
   readers_ = std::make_unique<SceneReaders>(operation_.world(), options_.follow, options_.rate_hz, context, structures());
   readers_->add_to(hub_);
   pieces_ = static_cast<int>(readers_->large_pieces().size());
-  if (options_.soft) options_.soft->meet(&operation_.world());
+  if (options_.soft) {
+    options_.soft->meet(&operation_.world());
+    hub_.add(*options_.soft, false);
+  }
 }
 
 Rehearsal::~Rehearsal() {
@@ -166,16 +169,21 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   return true;
 }
 
-// Soft tissue a hundredth of a second further, where the tool is now.
-std::optional<SceneAction> Rehearsal::move_soft() {
+// Soft tissue a hundredth of a second further, where the tools are now.
+void Rehearsal::move_soft() {
   const std::uint64_t tick = operation_.ticks();
-  const TickRecord& now = hub_.latest();
-  if (!options_.soft || tick < soft_tick_ || tick == 0) return std::nullopt;
+  if (!options_.soft || tick < soft_tick_ || tick == 0) return;
   soft_tick_ = tick + static_cast<std::uint64_t>(std::max(1.0, options_.rate_hz / SoftBody::kUpdatesPerS));
-  const auto push = options_.soft->update(
-      {from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.speed_rpm > 0});
+  std::vector<SoftTool> tools;
+  for (std::size_t hand = 0; hand < devices_.size(); ++hand) {
+    const TickRecord& now = hub_.latest(hand);
+    tools.push_back({from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.speed_rpm > 0});
+  }
+  for (const SceneAction& push : options_.soft->update(tools)) {
+    std::erase_if(soft_pushes_, [&](const SceneAction& before) { return before.hand == push.hand; });
+    soft_pushes_.push_back(push);
+  }
   tissue_mm3_ = options_.soft->cut_off_mm3();
-  return push;
 }
 
 void Rehearsal::act(const SceneAction& action) {
@@ -237,7 +245,11 @@ void Rehearsal::follow_on() {
       constexpr double kAtOnceMs = 20;
       const std::lock_guard lock(mutex_);
       drain(kAtOnceMs);
-      if (running()) action = move_soft();
+      if (running()) move_soft();
+      if (!soft_pushes_.empty()) {
+        action = soft_pushes_.front();
+        soft_pushes_.pop_front();
+      }
     }
     // What is due stays where it is until the servo can take it up, or has ended: finish() does the rest.
     if (!action && running()) {
@@ -299,11 +311,15 @@ bool Rehearsal::run_on(const Context& context) {
       lock.lock();
       perform(timed_.front(), false);
       timed_.pop_front();
-    } else if (options_.soft && operation_.ticks() >= soft_tick_ && operation_.active()) {
+    } else if (options_.soft && (operation_.ticks() >= soft_tick_ || !soft_pushes_.empty()) && operation_.active()) {
       // One action a tick: what was to be done comes first.
       lock.lock();
       drain();
-      if (const auto push = move_soft()) perform(*push, false);
+      move_soft();
+      if (!soft_pushes_.empty()) {
+        perform(soft_pushes_.front(), false);
+        soft_pushes_.pop_front();
+      }
     }
     if (!operation_.step(0)) return true;
     if (operation_.ticks() % 64 != 0) continue;
@@ -356,6 +372,7 @@ RehearsalSummary Rehearsal::finish() {
   s.removed_mm3 = operation_.removed_mm3();
   s.sawn_mm3 = readers_->tools.sawn_mm3();
   s.tissue_mm3 = tissue_mm3_;
+  s.tissue = tissue();
   // After a failure nobody knows whether all of it went into the stream.
   if (!failure_) s.bone_hash = operation_.world().hash();
   s.ticks_not_followed = hub_.ticks_lost();

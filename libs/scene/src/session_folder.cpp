@@ -243,6 +243,7 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
   j["hardness"] = hardness_of(anatomy);
   if (s.sawn_mm3 > 0) j["sawn_mm3"] = s.sawn_mm3;
   if (s.tissue_mm3 > 0) j["tissue_cut_off_mm3"] = s.tissue_mm3;
+  for (const SoftTissue::Facts& f : s.tissue) j["tissue"].push_back({{"name", f.name}, {"cut_off_mm3", f.cut_off_mm3}});
   if (s.bodies > 1) j["bodies"] = s.bodies;
   for (const Fixture& f : s.fixtures) {
     j["plates"].push_back({{"plate", plate_library()[f.plate].name}, {"number", f.id}, {"opening_mm", f.opening_mm}});

@@ -4,11 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
 #include "osteo/bone/instrument.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/io/tet_io.h"
 #include "osteo/tets/skin.h"
 #include "osteo/tissue/dynamics.h"
 #include "osteo/tissue/problem.h"
@@ -18,15 +14,17 @@
 namespace osteo {
 namespace {
 
-// An update stays within its hundredth of a second: so many steps, and so many steps times tetrahedra (4 to 10 ms of a core). Not measured
-// here, or two runs of one script would differ.
-constexpr int kMostSteps = 200;
-constexpr double kMostTetSteps = 250'000;
-constexpr double kToolStiffness = 0.1;   // N/mm of each place that the tool meets
-constexpr double kBoneStiffness = 0.3;   // and of each point that meets bone
+constexpr int kMostSteps = 200;         // of an update: beside SoftBody::kMostWork
+constexpr double kToolStiffness = 0.1;  // N/mm of each place that the tool meets
+constexpr double kBoneStiffness = 0.3;  // and of each point that meets bone
+constexpr double kLeastPushN = 1e-4;
 constexpr double kFeltStiffness = 0.05;  // N/mm for each place that the tool meets: in series with what gives way behind it
 constexpr double kDampingPerS = 150;     // tissue does not ring
 constexpr double kStepShare = 0.75;      // of the certified step, so that there is room for stiff contact
+constexpr double kGrip = 1;              // of what does not turn: a surface does not slip round what has dug in
+// Still: no point further than this from where it was so many updates ago. Then the bone is looked at once more, and it takes so many more.
+constexpr double kStillMm = 1e-3;
+constexpr int kStillUpdates = 50, kLastUpdates = 5;
 
 std::array<std::uint32_t, 4> sorted(std::array<std::uint32_t, 4> t) {
   std::sort(t.begin(), t.end());
@@ -47,9 +45,13 @@ struct SoftBody::Impl {
   std::vector<std::uint32_t> point_of;                    // of the points after the skin's: point of the body
   TriMesh whole_skin;                                     // with all its triangles
   std::set<std::array<std::uint32_t, 3>> whole_boundary;  // faces outside before anything was cut; with a skin only
-  std::uint64_t version = 1;
-  int steps = 1;
-  bool pushed = false;
+  std::uint64_t version = 1, updates = 0;
+  double wanted_steps = 1;  // for an update in real time
+  int steps = 1;            // of the last one
+  Vec3 lo, hi;              // box around the points
+  std::vector<Vec3> still_at;
+  int still = 0;  // updates
+  bool asleep = false;
 
   Impl(TissueModel m, const TissueProblem& problem, const TetMesh& of, const TriMesh* finer)
       : mesh(of),
@@ -67,10 +69,33 @@ struct SoftBody::Impl {
     } else {
       drawn = boundary_of(mesh, &point_of);
     }
-    const double wanted = 1 / kUpdatesPerS / dynamics.step_s();
-    const double most = std::min<double>(kMostSteps, kMostTetSteps / static_cast<double>(model.tets().size()));
-    steps = static_cast<int>(std::max(1.0, std::round(std::min(wanted, most))));
+    wanted_steps = 1 / kUpdatesPerS / dynamics.step_s();
+    steps = steps_within(kMostWork);
+    still_at = dynamics.positions_mm();
+    box_in(still_at);
   }
+
+  [[nodiscard]] int steps_within(double work) const {
+    const double most = std::min<double>(kMostSteps, work / static_cast<double>(model.tets().size()));
+    return static_cast<int>(std::max(1.0, std::round(std::min(wanted_steps, most))));
+  }
+  void box_in(std::span<const Vec3> points) {
+    lo = {1e300, 1e300, 1e300};
+    hi = {-1e300, -1e300, -1e300};
+    for (const Vec3& p : points) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], p[a]);
+        hi[a] = std::max(hi[a], p[a]);
+      }
+    }
+  }
+  // A place that is no number is not near.
+  [[nodiscard]] bool near(const RigidShape::Ball& ball) const {
+    Vec3 off;
+    for (std::size_t a = 0; a < 3; ++a) off[a] = std::max({lo[a] - ball.centre_mm[a], 0.0, ball.centre_mm[a] - hi[a]});
+    return std::isfinite(dot(ball.centre_mm, ball.centre_mm)) && length(off) <= ball.radius_mm + kNearMm;
+  }
+  void rest_or_not(bool disturbed);
 
   // Triangles by the body's points, sorted.
   [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> faces_of(const TriMesh& surface) const {
@@ -125,26 +150,86 @@ SoftBody::~SoftBody() = default;
 
 void SoftBody::meet(const World* world) {
   impl_->dynamics.set_obstacle({world != nullptr ? std::make_shared<LiveBone>(*world) : nullptr, kBoneStiffness});
+  wake();
 }
 
-std::optional<SceneAction> SoftBody::update(const SoftTool& tool) {
+std::vector<SoftPush> SoftBody::update(std::span<const SoftTool> tools, double most_work) {
   Impl& m = *impl_;
-  const Instrument& held = instrument_of(tool.tool);
-  const auto shape = std::make_shared<ToolShape>(held.head, tool.at_mm, tool.axis);
-  m.dynamics.set_tool({shape, kToolStiffness});
-  const Vec3 force = m.dynamics.step(m.steps);
-  const double size = length(force);
-  const bool pushes = size > 1e-4;
-  const double met = std::max(1, m.dynamics.met_by_tool());
-  if (const Burr* const edge = held.cutter(); edge != nullptr && tool.turns && pushes) {
-    if (m.cutting.cut(m.dynamics, *shape, VoxelCutting::rate_mm3_per_s(size, edge->rate_mm3_per_s_per_n) / kUpdatesPerS)) m.lay_surface();
+  std::vector<SoftPush> pushes(tools.size());
+  if (sleeps_with(tools)) return pushes;
+  if (m.asleep) wake();
+  m.steps = m.steps_within(most_work);
+  bool disturbed = false;
+  std::vector<std::shared_ptr<const ToolShape>> shapes;
+  for (std::size_t n = 0; n < tools.size(); ++n) {
+    auto shape = std::make_shared<const ToolShape>(instrument_of(tools[n].tool).head, tools[n].at_mm, tools[n].axis);
+    if (m.near(shape->bounds())) {
+      disturbed = true;
+      m.dynamics.set_tool({shape, kToolStiffness, tools[n].turns ? 0 : kGrip}, n);
+    } else {
+      m.dynamics.set_tool({}, n);
+    }
+    shapes.push_back(std::move(shape));
   }
-  if (!pushes && !m.pushed) return std::nullopt;
-  m.pushed = pushes;
-  if (!pushes) return SceneAction::soft_push(tool.at_mm, {}, 0, 0);
-  return SceneAction::soft_push(tool.at_mm, force / size, size, kFeltStiffness * met);
+  m.dynamics.step(m.steps);
+  ++m.updates;
+  for (std::size_t n = 0; n < tools.size(); ++n) {
+    const Vec3 force = m.dynamics.force_on_tool_n(n);
+    if (!(length(force) > kLeastPushN)) continue;
+    pushes[n] = {force, kFeltStiffness * std::max(1, m.dynamics.met_by_tool(n))};
+  }
+  bool cut = false;
+  for (std::size_t n = 0; n < tools.size(); ++n) {
+    const Burr* const edge = instrument_of(tools[n].tool).cutter();
+    const double size = length(pushes[n].force_n);
+    if (edge == nullptr || !tools[n].turns || !(size > 0)) continue;
+    cut = m.cutting.cut(m.dynamics, *shapes[n], VoxelCutting::rate_mm3_per_s(size, edge->rate_mm3_per_s_per_n) / kUpdatesPerS, n) || cut;
+  }
+  if (cut) m.lay_surface();
+  m.rest_or_not(disturbed);
+  return pushes;
 }
 
+void SoftBody::Impl::rest_or_not(bool disturbed) {
+  const std::vector<Vec3> now = dynamics.positions_mm();
+  box_in(now);
+  bool moved = disturbed;
+  for (std::size_t p = 0; p < now.size() && !moved; ++p) moved = !(length(now[p] - still_at[p]) <= kStillMm);
+  if (moved) {
+    still = 0;
+    still_at = now;
+    return;
+  }
+  // What it lies on is looked at only now and then: it does not fall asleep on what is gone.
+  if (++still == kStillUpdates) dynamics.look_at_obstacle();
+  asleep = still >= kStillUpdates + kLastUpdates;
+}
+
+bool SoftBody::sleeps_with(std::span<const SoftTool> tools) const {
+  return impl_->asleep && std::none_of(tools.begin(), tools.end(), [&](const SoftTool& t) {
+           return impl_->near(ToolShape(instrument_of(t.tool).head, t.at_mm, t.axis).bounds());
+         });
+}
+
+void SoftBody::wake() {
+  Impl& m = *impl_;
+  if (m.asleep) m.dynamics.look_at_obstacle();
+  m.asleep = false;
+  m.still = 0;
+}
+
+void SoftBody::wake_near(Vec3 at_mm, std::uint8_t tool) {
+  const RoundCone& head = instrument_of(tool).head;
+  // Whichever way it is held.
+  if (impl_->near({at_mm, std::abs(head.start_mm) + head.length_mm + head.largest_radius_mm()})) wake();
+}
+
+bool SoftBody::asleep() const {
+  return impl_->asleep;
+}
+double SoftBody::work() const {
+  return std::min<double>(impl_->wanted_steps, kMostSteps) * static_cast<double>(impl_->model.tets().size());
+}
 std::vector<Vec3> SoftBody::points_mm() const {
   return impl_->dynamics.positions_mm();
 }
@@ -162,6 +247,9 @@ const TriMesh& SoftBody::drawn() {
 std::uint64_t SoftBody::version() const {
   return impl_->version;
 }
+std::uint64_t SoftBody::updates() const {
+  return impl_->updates;
+}
 double SoftBody::cut_off_mm3() const {
   return impl_->cutting.cut_mm3();
 }
@@ -170,18 +258,6 @@ double SoftBody::slow_motion() const {
 }
 std::size_t SoftBody::memory_bytes() const {
   return impl_->model.element_count() * (sizeof(TissueModel::Constraint) + 40) + impl_->model.point_count() * 100;
-}
-
-std::shared_ptr<SoftBody> soft_body_of(const std::filesystem::path& folder) {
-  const auto mesh = folder / "tissue.vtu", problem = folder / "tissue.json", constants = folder / "tissue-constants.json",
-             skin = folder / "tissue.ply";
-  if (!std::filesystem::exists(mesh) && !std::filesystem::exists(problem)) return nullptr;
-  if (!std::filesystem::exists(mesh) || !std::filesystem::exists(problem))
-    throw Error(ExitCode::no_input, "the case lists soft tissue by halves: it needs tissue.vtu and tissue.json",
-                "'osteo tetrahedralize --method grid' makes the first, docs/tissue.md describes the second");
-  const Surface finer = std::filesystem::exists(skin) ? load_surface(skin) : nullptr;
-  return std::make_shared<SoftBody>(*load_tets(mesh), read_text(problem),
-                                    std::filesystem::exists(constants) ? std::optional(read_text(constants)) : std::nullopt, finer.get());
 }
 
 }  // namespace osteo

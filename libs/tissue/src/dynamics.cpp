@@ -252,41 +252,37 @@ std::vector<std::uint32_t> TissueDynamics<Real>::loose() const {
 }
 
 template <class Real>
-Vec3 TissueDynamics<Real>::Impl::forces() {
+void TissueDynamics<Real>::Impl::forces() {
   static const auto function = force_function<Real>();
   std::copy(lx.begin(), lx.end(), fx.begin());
   std::copy(ly.begin(), ly.end(), fy.begin());
   std::copy(lz.begin(), lz.end(), fz.begin());
   function(arrays);
-  Vec3 on_tool{};
-  met = 0;
-  if (tool.shape) on_tool = push_by_tool();
+  for (Tool& tool : tools) push_by(tool);
   if (obstacle.shape) push_by_obstacle();
   for (const Slider& q : sliders) {
     for (std::size_t a = 0; a < 3; ++a) {
       if ((q.held >> a & 1) != 0) (a == 0 ? fx : a == 1 ? fy : fz)[q.point] = 0;
     }
   }
-  return on_tool;
 }
 
 template <class Real>
 Vec3 TissueDynamics<Real>::step(int steps) {
   Impl& m = *impl_;
-  Vec3 on_tool{};
-  for (int s = 0; s < steps && m.is_factorised(); ++s) on_tool = m.step_factorised();
+  for (int s = 0; s < steps && m.is_factorised(); ++s) m.step_factorised();
   for (int s = 0; s < steps && !m.is_factorised(); ++s) {
     if (++m.since_certified >= kCertifySteps) {
       m.since_certified = 0;
       m.certify_again();
     }
-    if (m.tool.shape && m.tool_steps++ % kObstacleSteps == 0) m.find_near();
+    if (m.has_tool() && m.tool_steps++ % kObstacleSteps == 0) m.find_near();
     if (m.obstacle.shape) {
       if (m.steps % kObstacleSteps == 0) m.find_planes();
       if (m.steps % kTieSteps == 0) m.untie();
       ++m.steps;
     }
-    on_tool = m.forces();
+    m.forces();
     const Real a = static_cast<Real>(0.5 * m.options.damping_per_s * m.dt), keep = 1 - a, whole = 1 / (1 + a);
     const Real dt2 = static_cast<Real>(m.dt * m.dt);
     for (std::size_t p = 0; p < m.x.size(); ++p) {
@@ -306,7 +302,7 @@ Vec3 TissueDynamics<Real>::step(int steps) {
       }
     }
   }
-  return on_tool;
+  return force_on_tool_n(0);
 }
 
 template <class Real>
@@ -314,8 +310,12 @@ double TissueDynamics<Real>::step_s() const {
   return impl_->dt;
 }
 template <class Real>
-int TissueDynamics<Real>::met_by_tool() const {
-  return impl_->met;
+Vec3 TissueDynamics<Real>::force_on_tool_n(std::size_t number) const {
+  return number < impl_->tools.size() ? impl_->tools[number].force : Vec3{};
+}
+template <class Real>
+int TissueDynamics<Real>::met_by_tool(std::size_t number) const {
+  return number < impl_->tools.size() ? impl_->tools[number].met : 0;
 }
 template <class Real>
 std::size_t TissueDynamics<Real>::point_count() const {

@@ -81,8 +81,8 @@ void TissueDynamics<Real>::Impl::factorise() {
 
 // Of the energy that the step makes least: inertia and all that pushes. Zero where nothing moves.
 template <class Real>
-Vec3 TissueDynamics<Real>::Impl::gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient) {
-  const Vec3 on_tool = forces();
+void TissueDynamics<Real>::Impl::gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient) {
+  forces();
   for (std::uint32_t p = 0; p < x.size(); ++p) {
     float* const g = gradient.data() + 4 * static_cast<std::size_t>(p);
     if (inverse_mass[p] == 0) {
@@ -99,14 +99,13 @@ Vec3 TissueDynamics<Real>::Impl::gradient_of_step(const std::vector<Vec3>& targe
       if ((q.held >> a & 1) != 0) gradient[4 * static_cast<std::size_t>(q.point) + a] = 0;
     }
   }
-  return on_tool;
 }
 
 template <class Real>
-Vec3 TissueDynamics<Real>::Impl::step_factorised() {
+void TissueDynamics<Real>::Impl::step_factorised() {
   if (!factorised) factorise();
   Factorised& m = *factorised;
-  if (tool.shape) find_near();
+  if (has_tool()) find_near();
   if (obstacle.shape) {
     find_planes();
     if (steps++ % 20 == 0) untie();
@@ -159,7 +158,7 @@ Vec3 TissueDynamics<Real>::Impl::step_factorised() {
     const double share = end > slope ? std::min(-slope / (end - slope), 1.5) : 1.0;
     move(static_cast<float>(share) - 1);
   }
-  const Vec3 on_tool = forces();
+  forces();
   for (std::size_t p = 0; p < n; ++p) {
     if (std::isfinite(x[p] + y[p] + z[p])) continue;
     x[p] = m.x0[p];
@@ -167,7 +166,6 @@ Vec3 TissueDynamics<Real>::Impl::step_factorised() {
     z[p] = m.z0[p];
     ++counts.not_finite;
   }
-  return on_tool;
 }
 
 template <class Real>
@@ -183,7 +181,7 @@ template void TissueDynamics<float>::prepare();
 template void TissueDynamics<double>::prepare();
 template std::size_t TissueDynamics<float>::factor_bytes() const;
 template std::size_t TissueDynamics<double>::factor_bytes() const;
-template Vec3 TissueDynamics<float>::Impl::step_factorised();
-template Vec3 TissueDynamics<double>::Impl::step_factorised();
+template void TissueDynamics<float>::Impl::step_factorised();
+template void TissueDynamics<double>::Impl::step_factorised();
 
 }  // namespace osteo

@@ -1,5 +1,6 @@
 // The inside of TissueDynamics: the body in its arrays (dynamics.cpp) and what it meets (dynamics_contact.cpp).
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -24,7 +25,7 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Real> edge_k, edge_inverse, face_k, face_inverse, voxel_k[2], voxel_inverse[2], tet_k, tet_inverse;
   tissue::Arrays<Real> arrays;
   // Contact (dynamics_contact.cpp).
-  RigidContact tool, obstacle;
+  RigidContact obstacle;
   std::vector<std::uint32_t> surface;  // points of the body's boundary
   std::vector<bool> tied;              // of all points: to its place in the obstacle
   std::vector<std::uint32_t> ties;     // those
@@ -36,15 +37,29 @@ struct TissueDynamics<Real>::Impl {
   std::vector<Plane> planes;
   // The tool meets the triangles of the surface where they are nearest to it, and points: all, so that one that is inside is pushed out,
   // too.
-  std::vector<std::array<std::uint32_t, 3>> triangles;     // facing outwards
-  std::vector<std::uint32_t> triangles_of;                 // of each point: how many; 0 inside the body
-  std::vector<std::uint32_t> near_triangles, near_points;  // those that the tool may reach before it is looked for again
-  std::vector<RigidShape::Ball> tool_balls;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // facing outwards
+  std::vector<std::uint32_t> triangles_of;              // of each point: how many; 0 inside the body
+  // Of a tool and a triangle, from when it was met until it has been left.
+  struct Touch {
+    bool on = false;      // met, and from outside
+    Vec3 centre, normal;  // of the tool's bounds and the triangle when it was met
+    double place[3]{};    // what sticks to the tool: where in the triangle,
+    Vec3 held;            // and where from the middle of the tool's bounds
+  };
+  struct Tool {
+    RigidContact contact;
+    std::vector<RigidShape::Ball> balls;
+    std::vector<std::uint32_t> near_triangles, near_points;  // those that it may reach before they are looked for again
+    std::vector<Touch> touches;                              // one a triangle; empty: it meets none
+    Vec3 force;                                              // on it
+    int met = 0;
+  };
+  std::vector<Tool> tools;
+  double crowd = 1;   // tools that may reach the body
   double margin = 0;  // nearer to the obstacle than this a point gets a plane
   std::uint64_t steps = 0, tool_steps = 0, since_certified = 0;
   std::unique_ptr<tissue::Cutter> cutter;  // once something was cut
   double load_size = 0;
-  int met = 0;
   Counts counts;
 
   // Of factorised steps (dynamics_factorised.cpp), once there was one.
@@ -55,14 +70,14 @@ struct TissueDynamics<Real>::Impl {
   [[nodiscard]] bool is_factorised() const { return options.factorised_step_s > 0; }
   [[nodiscard]] double inertia(std::uint32_t p) const;
   void factorise();
-  Vec3 gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient);
-  Vec3 step_factorised();
+  void gradient_of_step(const std::vector<Vec3>& target, std::vector<float>& gradient);
+  void step_factorised();
   void lay_out();
   double certify();
   void certify_again();
   template <class At>
   void rows(bool edges, const At& place, std::vector<double>& row) const;
-  Vec3 forces();
+  void forces();
   // What the certified step leaves room for, of tool and obstacle each: with both omega dt stays below 2.
   [[nodiscard]] double room(std::uint32_t p) const {
     if (is_factorised()) return INFINITY;
@@ -82,8 +97,15 @@ struct TissueDynamics<Real>::Impl {
   }
   void find_planes();
   void lay_surface();
+  [[nodiscard]] bool has_tool() const {
+    return std::any_of(tools.begin(), tools.end(), [](const Tool& t) { return t.contact.shape != nullptr; });
+  }
   void find_near();
-  Vec3 push_by_tool();
+  void find_near(Tool& tool);
+  void push_by(Tool& tool);
+  void push_triangle(Tool& tool, std::uint32_t triangle);
+  // Each triangle of a point may push all of it, of each tool.
+  [[nodiscard]] double tool_share(std::uint32_t p) const { return room(p) / std::max<double>(1, triangles_of[p]) / crowd; }
   void push_by_obstacle();
   // Points whose place in the obstacle is gone.
   void untie();

@@ -10,9 +10,11 @@ double VoxelCutting::rate_mm3_per_s(double force_n, double bone_mm3_per_s_per_n)
 
 VoxelCutting::VoxelCutting(const TissueModel& model, double voxel_mm3) : model_(model), voxel_mm3_(voxel_mm3), gone_(model.tets().size()) {}
 
-bool VoxelCutting::cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3) {
-  saved_mm3_ = std::min(saved_mm3_ + mm3, kMostSaved * voxel_mm3_);
-  if (saved_mm3_ < voxel_mm3_) return false;
+bool VoxelCutting::cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number) {
+  if (number >= saved_mm3_.size()) saved_mm3_.resize(number + 1);
+  double& saved_mm3 = saved_mm3_[number];
+  saved_mm3 = std::min(saved_mm3 + mm3, kMostSaved * voxel_mm3_);
+  if (saved_mm3 < voxel_mm3_) return false;
   const auto x = body.positions_mm();
   const RigidShape::Ball near = tool.bounds();
   std::vector<std::pair<double, std::uint32_t>> met;  // depth, voxel
@@ -32,8 +34,8 @@ bool VoxelCutting::cut(TissueDynamics<float>& body, const RigidShape& tool, doub
   std::sort(met.begin(), met.end());
   std::vector<std::uint32_t> tets;
   for (const auto& [depth, v] : met) {
-    if (saved_mm3_ < voxel_mm3_) break;
-    saved_mm3_ -= voxel_mm3_;
+    if (saved_mm3 < voxel_mm3_) break;
+    saved_mm3 -= voxel_mm3_;
     for (std::uint32_t t = 5 * v; t < 5 * v + 5; ++t) tets.push_back(t);
   }
   if (tets.empty()) return false;

@@ -39,7 +39,7 @@ WorldView::~WorldView() {
   stop_ = true;
   if (coarsening_.valid()) coarsening_.wait();
   if (looking_.valid()) looking_.wait();
-  if (soft_actor_) renderer_->RemoveActor(soft_actor_);
+  for (const SoftView& s : soft_) renderer_->RemoveActor(s.actor);
 }
 
 void WorldView::update(const World& world, SceneReaders& readers, Work work) {
@@ -128,23 +128,33 @@ bool WorldView::look_at_heat(const SceneReaders& readers, std::chrono::steady_cl
   return was_warm || !warm_places_.empty();
 }
 
-void WorldView::update_soft(SoftBody& soft) {
-  const TriMesh& mesh = soft.drawn();
-  if (!soft_actor_ || soft_version_ != soft.version()) {
-    if (soft_actor_) renderer_->RemoveActor(soft_actor_);
-    soft_version_ = soft.version();
-    soft_data_ = to_vtk(mesh);
-    soft_actor_ = make_bone_actor(soft_data_);
-    soft_actor_->GetProperty()->SetColor(0.80, 0.42, 0.40);
-    soft_actor_->GetProperty()->SetSpecular(0.3);
-    soft_actor_->GetMapper()->StaticOff();
-    renderer_->AddActor(soft_actor_);
-    return;
+void WorldView::update_soft(SoftTissue& soft) {
+  // Muscle, fat, dura, gland: bodies side by side are told apart.
+  constexpr double kColours[][3] = {{0.80, 0.42, 0.40}, {0.84, 0.68, 0.42}, {0.72, 0.52, 0.62}, {0.62, 0.32, 0.28}};
+  soft_.resize(soft.size());
+  for (std::size_t n = 0; n < soft.size(); ++n) {
+    SoftView& view = soft_[n];
+    SoftBody& body = soft.body(n);
+    if (view.actor && view.version == body.version() && view.updates == body.updates()) continue;
+    const TriMesh& mesh = body.drawn();
+    view.updates = body.updates();
+    if (!view.actor || view.version != body.version()) {
+      if (view.actor) renderer_->RemoveActor(view.actor);
+      view.version = body.version();
+      view.data = to_vtk(mesh);
+      view.actor = make_bone_actor(view.data);
+      const auto& colour = kColours[n % std::size(kColours)];
+      view.actor->GetProperty()->SetColor(colour[0], colour[1], colour[2]);
+      view.actor->GetProperty()->SetSpecular(0.3);
+      view.actor->GetMapper()->StaticOff();
+      renderer_->AddActor(view.actor);
+      continue;
+    }
+    vtkPoints* const at = view.data->GetPoints();
+    for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) at->SetPoint(static_cast<vtkIdType>(p), mesh.points_mm[p].data());
+    at->Modified();
+    view.data->Modified();
   }
-  vtkPoints* const at = soft_data_->GetPoints();
-  for (std::size_t p = 0; p < mesh.points_mm.size(); ++p) at->SetPoint(static_cast<vtkIdType>(p), mesh.points_mm[p].data());
-  at->Modified();
-  soft_data_->Modified();
 }
 
 void WorldView::highlight(std::uint32_t body) {
@@ -280,7 +290,7 @@ bool WorldView::rest(int width, int height, bool coarse) {
   return false;
 }
 
-Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p, SoftBody* soft) {
+Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& p, SoftTissue* soft) {
   OffscreenWindow window(p.width, p.height);
   vtkNew<vtkRenderer> renderer;
   window.window()->AddRenderer(renderer);

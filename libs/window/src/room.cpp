@@ -285,6 +285,7 @@ void Room::draw_panel(const RoomScene& scene) {
   if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
   draw_settings(rehearsal);
   draw_posture(rehearsal);
+  draw_tissue(rehearsal);
   if (ImGui::CollapsingHeader("Case and machine")) {
     draw_approval(scene.machine.approval, scene.machine.approval_ended);
     if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);

@@ -52,6 +52,21 @@ void draw_posture(Rehearsal& rehearsal) {
   if (changed) rehearsal.act(SceneAction::posture(down_of(now.posture, static_cast<double>(turned))));
 }
 
+void draw_tissue(const Rehearsal& rehearsal) {
+  const std::vector<SoftTissue::Facts> bodies = rehearsal.tissue();
+  if (bodies.empty() || !ImGui::CollapsingHeader("Soft tissue")) return;
+  for (const SoftTissue::Facts& body : bodies) {
+    // A name is a folder's: nothing in it is a format.
+    ImGui::TextUnformatted(body.name.c_str());
+    ImGui::SameLine(6 * ImGui::GetFontSize());
+    if (body.asleep) {
+      ImGui::Text("%.1f mm3 cut off, at rest", body.cut_off_mm3);
+    } else {
+      ImGui::Text("%.1f mm3 cut off, %.0f %% of real time", body.cut_off_mm3, 100 * body.of_real_time);
+    }
+  }
+}
+
 void draw_settings(Rehearsal& rehearsal) {
   if (!ImGui::CollapsingHeader("How it feels")) return;
   HapticsParams params = rehearsal.settings();

@@ -8,5 +8,7 @@ namespace osteo {
 void draw_settings(Rehearsal& rehearsal);
 /// The same for how the patient lies; nothing in a scene without dust.
 void draw_posture(Rehearsal& rehearsal);
+/// The bodies of soft tissue by name, with what was cut off each and how its time goes; nothing in a scene without.
+void draw_tissue(const Rehearsal& rehearsal);
 
 }  // namespace osteo

@@ -15,7 +15,7 @@
 #include "osteo/rt/loop.h"
 #include "osteo/scene/operation.h"
 #include "osteo/scene/scene_readers.h"
-#include "osteo/scene/soft_body.h"
+#include "osteo/scene/soft_tissue.h"
 #include "osteo/session/recorder.h"
 #include "osteo/session/script.h"
 #include "osteo/session/session_reader.h"
@@ -29,7 +29,7 @@ struct RehearsalOptions {
   std::filesystem::path session_file;  ///< empty: not recorded
   ReaderList follow;                   ///< what is kept up beside the servo
   std::vector<SceneAction> actions;    ///< done when their tick has come, in order
-  std::shared_ptr<SoftBody> soft;      ///< soft tissue that the tool meets; null: none
+  std::shared_ptr<SoftTissue> soft;    ///< soft tissue that the hands' tools meet; null: none
   std::function<void(const std::string& kind, const std::string& json)> heard;  ///< each note too, in the thread that leaves it
 };
 
@@ -44,9 +44,10 @@ struct ActionNote {
 
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
-  double removed_mm3 = 0;  ///< by the burr
-  double sawn_mm3 = 0;     ///< by the saw, and crumbs of splits
-  double tissue_mm3 = 0;   ///< soft tissue cut off, as at rest
+  double removed_mm3 = 0;                 ///< by the burr
+  double sawn_mm3 = 0;                    ///< by the saw, and crumbs of splits
+  double tissue_mm3 = 0;                  ///< soft tissue cut off, as at rest
+  std::vector<SoftTissue::Facts> tissue;  ///< each body; empty where the scene has none
   std::string bone_hash, surface_hash;
   std::uint64_t ticks_not_recorded = 0;  ///< in the gaps
   std::vector<RecordingGap> gaps;
@@ -136,7 +137,11 @@ class Rehearsal {
   /// The settings as the last action has left them.
   [[nodiscard]] HapticsParams settings() const;
   /// Null where the scene has none; under look() only.
-  [[nodiscard]] SoftBody* soft() const { return options_.soft.get(); }
+  [[nodiscard]] SoftTissue* soft() const { return options_.soft.get(); }
+  /// Its bodies as they were last, from any thread.
+  [[nodiscard]] std::vector<SoftTissue::Facts> tissue() const {
+    return options_.soft ? options_.soft->facts() : std::vector<SoftTissue::Facts>{};
+  }
   /// Calls f under the lock that keeps the follower away: bodies, plates, surfaces and dust do not change meanwhile, densities may.
   void look(const std::function<void(const World&, SceneReaders&)>& f);
 
@@ -153,7 +158,7 @@ class Rehearsal {
   void follow_on();
   std::size_t drain(std::optional<double> about_ms = {});
   bool perform(const SceneAction& action, bool live);
-  std::optional<SceneAction> move_soft();
+  void move_soft();
   bool run_on(const Context& context);
   RehearsalSummary finish();
 
@@ -174,7 +179,8 @@ class Rehearsal {
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
   std::vector<ActionNote> notes_;
-  std::uint64_t soft_tick_ = 0;  // of the next update of soft tissue
+  std::uint64_t soft_tick_ = 0;          // of the next update of soft tissue
+  std::deque<SceneAction> soft_pushes_;  // of the last one, that the servo has not got yet: one a tick
   std::atomic<bool> stop_{false}, elsewhere_{false};
   std::deque<SceneAction> done_elsewhere_;  // whose tick has come
   Device* seat_ = nullptr;

@@ -74,6 +74,9 @@ class SurfaceShape final : public RigidShape {
 struct RigidContact {
   std::shared_ptr<const RigidShape> shape;  ///< null: none
   double stiffness_n_per_mm = 1;
+  /// Coulomb's coefficient of what has dug in: from one radius past where it met a triangle on, whole from one and a half. Without it a
+  /// surface slips round a tool that is pressed two radii deep. Of tools of TissueDynamics alone.
+  double grip = 0;
 };
 
 }  // namespace osteo

@@ -39,11 +39,14 @@ class TissueDynamics {
 
   void set_load(std::span<const std::pair<std::uint32_t, Vec3>> forces_n);
   /// Pushes, at each step, the surface's triangles where they are nearest to it (a shape without balls: points only), and points inside the
-  /// body that it meets. Its stiffness is that of each triangle or point.
-  void set_tool(RigidContact tool);
+  /// body that it meets. Its stiffness is that of each triangle or point; where several tools are near, each has its part of what the step
+  /// leaves room for. `number`: of several tools, from 0.
+  void set_tool(RigidContact tool, std::size_t number = 0);
   /// Pushes points of the surface; where it is is looked up every tenth step, in between it is a plane for each point. Points that lie in
   /// it at rest may stay as deep.
   void set_obstacle(RigidContact obstacle);
+  /// The next step looks where the obstacle is and what of it is gone, which it does every so many steps otherwise.
+  void look_at_obstacle();
   void set_position(std::uint32_t point, Vec3 at_mm);
   /// Cuts off tetrahedra (their numbers in the model), without a restart: what they held goes, what they shared gets weaker. A point of
   /// which nothing is left stays where it is and meets nothing. O(constraints).
@@ -54,12 +57,14 @@ class TissueDynamics {
   /// Makes the factor of factorised steps now, which the first step does otherwise.
   void prepare();
   [[nodiscard]] std::size_t factor_bytes() const;  ///< 0 before it is made
-  /// Returns the force on the tool in the last step, N.
+  /// Returns the force on tool 0 in the last step, N.
   Vec3 step(int steps = 1);
 
   [[nodiscard]] double step_s() const;
+  /// The force on a tool in the last step, N; none on one that is not there.
+  [[nodiscard]] Vec3 force_on_tool_n(std::size_t number) const;
   /// Triangles and points that the tool met in the last step.
-  [[nodiscard]] int met_by_tool() const;
+  [[nodiscard]] int met_by_tool(std::size_t number = 0) const;
   [[nodiscard]] std::vector<Vec3> positions_mm() const;
   [[nodiscard]] Vec3 position_mm(std::uint32_t point) const;
   [[nodiscard]] std::size_t point_count() const;

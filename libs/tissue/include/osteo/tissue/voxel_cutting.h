@@ -26,9 +26,9 @@ class VoxelCutting {
   /// `model` must outlive it; all voxels are of `voxel_mm3`.
   VoxelCutting(const TissueModel& model, double voxel_mm3);
 
-  /// The tool may take `mm3` more. True when something was cut off `body`, whose tetrahedra are the model's. O(voxels), and O(constraints)
-  /// when something goes.
-  bool cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3);
+  /// The tool may take `mm3` more; `number`: of several, each with what it has saved. True when something was cut off `body`, whose
+  /// tetrahedra are the model's. O(voxels), and O(constraints) when something goes.
+  bool cut(TissueDynamics<float>& body, const RigidShape& tool, double mm3, std::size_t number = 0);
 
   [[nodiscard]] const std::vector<bool>& gone() const { return gone_; }  ///< one a tetrahedron
   [[nodiscard]] double cut_mm3() const { return cut_mm3_; }              ///< with what came loose
@@ -37,7 +37,8 @@ class VoxelCutting {
   void take(TissueDynamics<float>& body, std::span<const std::uint32_t> tets);
 
   const TissueModel& model_;
-  double voxel_mm3_, saved_mm3_ = 0, cut_mm3_ = 0;
+  double voxel_mm3_, cut_mm3_ = 0;
+  std::vector<double> saved_mm3_;  // of each tool
   std::vector<bool> gone_;
 };
 

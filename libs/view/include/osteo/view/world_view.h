@@ -9,7 +9,7 @@
 
 #include "osteo/data/data.h"
 #include "osteo/scene/scene_readers.h"
-#include "osteo/scene/soft_body.h"
+#include "osteo/scene/soft_tissue.h"
 #include "osteo/view/bone_view.h"
 #include "osteo/view/dust_view.h"
 #include "osteo/view/plate_view.h"
@@ -29,7 +29,7 @@ class WorldView {
   /// Shows the scene as it is; after the first time only what changed is made again.
   void update(const World& world, SceneReaders& readers, Work work = Work::urgent);
   /// Soft tissue as it is now; under the lock that keeps it still.
-  void update_soft(SoftBody& soft);
+  void update_soft(SoftTissue& soft);
   /// One body stands out; kNobody: none.
   void highlight(std::uint32_t body);
   [[nodiscard]] std::size_t triangles() const;
@@ -59,9 +59,12 @@ class WorldView {
   void take_coarse();
   vtkRenderer* renderer_;
   const StructureMap* structures_;
-  vtkSmartPointer<vtkActor> soft_actor_;
-  vtkSmartPointer<vtkPolyData> soft_data_;
-  std::uint64_t soft_version_ = 0;
+  struct SoftView {
+    vtkSmartPointer<vtkActor> actor;
+    vtkSmartPointer<vtkPolyData> data;
+    std::uint64_t version = 0, updates = 0;
+  };
+  std::vector<SoftView> soft_;
   WetFilm film_;
   std::map<std::uint32_t, std::unique_ptr<BoneView>> bodies_;
   PlateView plates_;
@@ -89,6 +92,6 @@ struct WorldPicture {
 };
 /// Works without a display. Error(failed) when there is no OpenGL.
 [[nodiscard]] Picture draw_world(const World& world, SceneReaders& readers, const StructureMap* structures, const WorldPicture& picture,
-                                 SoftBody* soft = nullptr);
+                                 SoftTissue* soft = nullptr);
 
 }  // namespace osteo
