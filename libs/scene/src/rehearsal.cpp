@@ -180,8 +180,13 @@ void Rehearsal::move_soft() {
     tools.push_back({from_floats(now.device.position_mm), normalized(from_floats(now.device.axis)), now.device.tool, now.speed_rpm > 0});
   }
   for (const SceneAction& push : options_.soft->update(tools)) {
-    std::erase_if(soft_pushes_, [&](const SceneAction& before) { return before.hand == push.hand; });
-    soft_pushes_.push_back(push);
+    // In its place: a hand whose turn has not come yet does not lose it.
+    const auto before = std::find_if(soft_pushes_.begin(), soft_pushes_.end(), [&](const SceneAction& a) { return a.hand == push.hand; });
+    if (before != soft_pushes_.end()) {
+      *before = push;
+    } else {
+      soft_pushes_.push_back(push);
+    }
   }
   tissue_mm3_ = options_.soft->cut_off_mm3();
 }
@@ -246,13 +251,11 @@ void Rehearsal::follow_on() {
       const std::lock_guard lock(mutex_);
       drain(kAtOnceMs);
       if (running()) move_soft();
-      if (!soft_pushes_.empty()) {
-        action = soft_pushes_.front();
-        soft_pushes_.pop_front();
-      }
     }
+    // Of each hand; what was asked for comes between two updates, however long they take.
+    for (; !soft_pushes_.empty() && running(); soft_pushes_.pop_front()) perform(soft_pushes_.front(), true);
     // What is due stays where it is until the servo can take it up, or has ended: finish() does the rest.
-    if (!action && running()) {
+    if (running()) {
       const std::lock_guard lock(queue_mutex_);
       if (!timed_.empty() && timed_.front().tick <= operation_.ticks()) {
         action = timed_.front();
