@@ -135,12 +135,16 @@ void tissue_measured(const Context& context) {
     group.push_back(c.nodes != 2 ? -1 : std::max(a, b) < 0.49 * kEdge ? 0 : std::min(a, b) > 0.51 * kEdge ? 1 : -1);
   }
   std::printf(
-      "### From measured surfaces: the cube, 1000 kPa below, 50 kPa above, guessed 200, not told of halves\n\nTruth: t10, %zu tetrahedra, %.0f s; "
+      "### From measured surfaces: the cube, 1000 kPa below, 50 kPa above, guessed 200, not told of halves\n\nTruth: t10, %zu tetrahedra, "
+      "%.0f s; "
       "RMS movement %.2f, %.2f, %.2f, %.2f mm. Noise in %% of the RMS movement of each load.\n\n",
-      fine.b.tets.size(), now_s() - began, rms_move(fine, truth[0]), rms_move(fine, truth[1]), rms_move(fine, truth[2]), rms_move(fine, truth[3]));
+      fine.b.tets.size(), now_s() - began, rms_move(fine, truth[0]), rms_move(fine, truth[1]), rms_move(fine, truth[2]),
+      rms_move(fine, truth[3]));
   std::printf(
-      "| seen | loads | map | noise %% | stray %% | left mm | noise found mm (true) | rejected %% | surface seen | stiff kPa (1000) | 95 %% | soft kPa (50) | 95 %% "
-      "| contrast (20) | NRMS | NRMS unseen load | settled | solves | s (told) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| seen | loads | map | noise %% | stray %% | left mm | noise found mm (true) | rejected %% | surface seen | stiff kPa (1000) | 95 "
+      "%% | soft kPa (50) | 95 %% "
+      "| contrast (20) | NRMS | NRMS unseen load | settled | solves | s (told) "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const Vec3 from = normalized({1, -1.2, 0.8});
   struct Row {
     const char* seen;
@@ -149,7 +153,11 @@ void tissue_measured(const Context& context) {
     double noise, stray;
   };
   std::vector<Row> rows;
-  for (const auto& [seen, many] : {std::pair{"all", std::size_t{1}}, {"all", std::size_t{3}}, {"half", std::size_t{3}}, {"markers", std::size_t{1}}, {"markers", std::size_t{3}}}) {
+  for (const auto& [seen, many] : {std::pair{"all", std::size_t{1}},
+                                   {"all", std::size_t{3}},
+                                   {"half", std::size_t{3}},
+                                   {"markers", std::size_t{1}},
+                                   {"markers", std::size_t{3}}}) {
     for (const double noise : {0.0, 1.0, 2.0, 5.0}) rows.push_back({seen, many, {3, 3, 9}, noise, 0});
     if (std::string(seen) != "markers") rows.push_back({seen, many, {3, 3, 9}, 2, 10});
   }
@@ -210,12 +218,13 @@ void tissue_measured(const Context& context) {
       counted += 1;
     }
     const MeasuredView& v = c.views[0];
-    std::printf("| %s | %zu | %d x %d x %d | %.0f | %.0f | %.3f | %.3f (%.3f) | %.1f | %.2f | %.0f | %.0f to %.0f | %.0f | %.0f to %.0f | %.1f | %.3f | %.3f | %.2f | %d | %.1f (%.0f) |\n",
-                row.seen, row.loads, row.grid[0], row.grid[1], row.grid[2], row.noise, row.stray, v.after.rms_mm, v.noise_mm, noise[0],
-                v.drawn > 0 ? 100.0 * static_cast<double>(v.rejected) / static_cast<double>(v.drawn) : 0, v.seen_share, kpa(0, 0),
-                kpa(0, -1.96), kpa(0, 1.96), kpa(1, 0), kpa(1, -1.96), kpa(1, 1.96), kpa(0, 0) / kpa(1, 0),
-                nrms_of(model, body, loads[0], field[0]), nrms_of(model, body, loads[3], field[3]), counted > 0 ? settled / counted : 0,
-                c.fit.solves, c.fit.seconds, c.estimate_s);
+    std::printf(
+        "| %s | %zu | %d x %d x %d | %.0f | %.0f | %.3f | %.3f (%.3f) | %.1f | %.2f | %.0f | %.0f to %.0f | %.0f | %.0f to %.0f | %.1f | "
+        "%.3f | %.3f | %.2f | %d | %.1f (%.0f) |\n",
+        row.seen, row.loads, row.grid[0], row.grid[1], row.grid[2], row.noise, row.stray, v.after.rms_mm, v.noise_mm, noise[0],
+        v.drawn > 0 ? 100.0 * static_cast<double>(v.rejected) / static_cast<double>(v.drawn) : 0, v.seen_share, kpa(0, 0), kpa(0, -1.96),
+        kpa(0, 1.96), kpa(1, 0), kpa(1, -1.96), kpa(1, 1.96), kpa(0, 0) / kpa(1, 0), nrms_of(model, body, loads[0], field[0]),
+        nrms_of(model, body, loads[3], field[3]), counted > 0 ? settled / counted : 0, c.fit.solves, c.fit.seconds, c.estimate_s);
     std::fflush(stdout);
   }
   std::printf("\n");

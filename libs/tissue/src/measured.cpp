@@ -56,12 +56,12 @@ using Matrix = Eigen::MatrixXd;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kUsed = 0.8;           // share of the points, the nearest, that the level is found by: the others may be astray
+constexpr double kUsed = 0.8;  // share of the points, the nearest, that the level is found by: the others may be astray
 constexpr int kMostRounds = 6;
-constexpr double kStray = 4;            // noises
-const double kFactorBefore = std::log(5.0);    // what nobody knows of a body's stiffness, one standard deviation
-const double kClassBefore = std::log(1.5);     // and of one kind of constraint over another
-const double kFacesBefore = std::log(5.0);     // of faces, which the closed form has none of
+constexpr double kStray = 4;                 // noises
+const double kFactorBefore = std::log(5.0);  // what nobody knows of a body's stiffness, one standard deviation
+const double kClassBefore = std::log(1.5);   // and of one kind of constraint over another
+const double kFacesBefore = std::log(5.0);   // of faces, which the closed form has none of
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -72,20 +72,25 @@ class Level {
  public:
   Level(const TissueModel& model, std::span<const MeasuredCase> cases, std::span<SurfaceGoal* const> goals, const CalibrateOptions& options,
         const Context& context)
-      : model_(model), cases_(cases), goals_(goals), options_(options), context_(context), solver_(model, model.rest(), cases.front().load) {
+      : model_(model),
+        cases_(cases),
+        goals_(goals),
+        options_(options),
+        context_(context),
+        solver_(model, model.rest(), cases.front().load) {
     for (const SurfaceGoal* g : goals) own.emplace_back(g->own());
     rest = off({cases.size(), model.rest()}, own);
   }
 
   double rest = 0;                        // mean square distance when nothing moves
-  std::vector<std::vector<double>> own;   // poses there
+  std::vector<std::vector<double> > own;  // poses there
   int solves = 0;
-  double solve_s = 0;                     // of all loads, once
+  double solve_s = 0;  // of all loads, once
 
   struct At {
     double log = 0, off = 1e300;
-    std::vector<std::vector<Vec3>> shapes;
-    std::vector<std::vector<double>> own;
+    std::vector<std::vector<Vec3> > shapes;
+    std::vector<std::vector<double> > own;
   };
   // From the stiffest down, since a body that is too soft may find no rest; then between.
   At find() {
@@ -131,7 +136,7 @@ class Level {
   }
 
   // Mean square of the nearest points, each load's alike.
-  double off(const std::vector<std::vector<Vec3>>& shapes, std::vector<std::vector<double>>& poses) const {
+  double off(const std::vector<std::vector<Vec3> >& shapes, std::vector<std::vector<double> >& poses) const {
     double sum = 0;
     for (std::size_t n = 0; n < goals_.size(); ++n) {
       goals_[n]->align(shapes[n], poses[n].data());
@@ -194,14 +199,15 @@ void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest
   const double spacing = std::sqrt(median(apart));
   const std::vector<Vec3> x = goal.moved(shape), x0 = goal.moved(rest);
   std::vector<double> by, area, reach;
-  std::vector<Vec3> middle;
+  std::vector<Vec3> middle, facing;
   double most = 0;
   for (const auto& t : goal.surface().triangles) {
     const Vec3 a = x[t[0]], b = x[t[1]], c = x[t[2]];
     middle.push_back((a + b + c) / 3);
     by.push_back(length(middle.back() - (x0[t[0]] + x0[t[1]] + x0[t[2]]) / 3));
-    area.push_back(length(cross(b - a, c - a)) / 2);
-    reach.push_back(std::max({2 * spacing, length(b - a), length(c - b), length(a - c)}));
+    facing.push_back(cross(b - a, c - a));
+    area.push_back(length(facing.back()) / 2);
+    reach.push_back(std::max({2 * spacing, 0.6 * length(b - a), 0.6 * length(c - b), 0.6 * length(a - c)}));
     most = std::max(most, by.back());
   }
   double seen = 0, whole = 0;
@@ -209,7 +215,10 @@ void describe(const SurfaceGoal& goal, std::size_t k, std::span<const Vec3> rest
     if (by[t] < 0.1 * most) continue;
     whole += area[t];
     for (std::size_t p = 0; p < n; ++p) {
-      if (stray[p] || length(goal.placed(k, p) - middle[t]) > reach[t]) continue;
+      // Not one round the corner.
+      if (stray[p] || length(goal.placed(k, p) - middle[t]) > reach[t] ||
+          !(dot(facing[goal.nearest(k, p)], facing[t]) > 0.7 * length(facing[goal.nearest(k, p)]) * length(facing[t])))
+        continue;
       seen += area[t];
       break;
     }
@@ -224,7 +233,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   const auto begin = Clock::now();
   if (cases.empty()) throw Error(ExitCode::usage, "a calibration needs at least one load");
   MeasuredCalibration result;
-  std::vector<std::unique_ptr<Goal>> owned;
+  std::vector<std::unique_ptr<Goal> > owned;
   std::vector<SurfaceGoal*> goals;
   std::vector<TissueLoad> loads;
   for (const MeasuredCase& c : cases) {
@@ -297,12 +306,17 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   }
   for (result.rounds = 1;; ++result.rounds) {
     Descent d = descend(fit, at, options.calibrate, context);
-    if (!d.usable) throw Error(ExitCode::failed, "no factors were found with which the model comes to rest under these loads: " + d.why, "make the loads smaller");
+    if (!d.usable)
+      throw Error(ExitCode::failed, "no factors were found with which the model comes to rest under these loads: " + d.why,
+                  "make the loads smaller");
     at = d.parameters;
     fit.result.converged = d.converged;
     fit.result.why = d.why;
-    fit.result.cost = std::move(d.costs);
-    fit.result.course.insert(fit.result.course.end(), d.course.begin(), d.course.end());
+    fit.result.cost.insert(fit.result.cost.end(), d.costs.begin(), d.costs.end());
+    for (auto& step : d.course) {
+      step.resize(static_cast<std::size_t>(fit.parameters()));
+      fit.result.course.push_back(std::move(step));
+    }
     // The last evaluation of a descent need not be where it ended.
     evaluate();
     bool stays = true;
@@ -319,7 +333,9 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   // What is left, and how sure the factors are.
   for (MeasuredView& view : result.views) {
     const std::size_t k = static_cast<std::size_t>(&view - result.views.data()) -
-                          static_cast<std::size_t>(std::find_if(result.views.begin(), result.views.end(), [&](const MeasuredView& o) { return o.load == view.load; }) - result.views.begin());
+                          static_cast<std::size_t>(std::find_if(result.views.begin(), result.views.end(),
+                                                                [&](const MeasuredView& o) { return o.load == view.load; }) -
+                                                   result.views.begin());
     describe(*goals[view.load], k, model.rest(), fit.shapes()[view.load], view);
     if (!options.find_pose) continue;
     const auto& v = goals[view.load]->views()[k];

@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 
 MeasuredPoints read_measured_csv(std::string_view text, const std::string& name) {
   const Csv csv = read_csv(text, name);
-  const std::string columns = "the columns are x_mm, y_mm, z_mm; of markers also x0_mm, y0_mm, z0_mm, where each was at rest; perhaps noise_mm";
+  const std::string columns =
+      "the columns are x_mm, y_mm, z_mm; of markers also x0_mm, y0_mm, z0_mm, where each was at rest; perhaps noise_mm";
   constexpr std::array<std::string_view, 7> kNames{"x_mm", "y_mm", "z_mm", "x0_mm", "y0_mm", "z0_mm", "noise_mm"};
   std::array<std::optional<std::size_t>, 7> at;
   for (std::size_t c = 0; c < csv.columns.size(); ++c) {
@@ -58,7 +59,9 @@ std::vector<MeasuredOfLoad> read_measured(const fs::path& path, const std::vecto
       if (!entry.path().filename().string().starts_with(".")) files.push_back(entry.path());
     }
     std::sort(files.begin(), files.end());
-    if (files.empty()) throw Error(ExitCode::usage, "the folder '" + path.filename().string() + "' holds no file", "each file is called like its load: pull.ply");
+    if (files.empty())
+      throw Error(ExitCode::usage, "the folder '" + path.filename().string() + "' holds no file",
+                  "each file is called like its load: pull.ply");
   } else {
     files.push_back(path);
   }
@@ -73,7 +76,8 @@ std::vector<MeasuredOfLoad> read_measured(const fs::path& path, const std::vecto
       if (name.starts_with(load_names[n] + ".") && (!load || load_names[n].size() > load_names[*load].size())) load = n;
     }
     if (!load)
-      throw Error(ExitCode::usage, "'" + name + "' is called like no load", "each file is called like its load, as in pull.ply; the loads are: " + names);
+      throw Error(ExitCode::usage, "'" + name + "' is called like no load",
+                  "each file is called like its load, as in pull.ply; the loads are: " + names);
     const auto e = file.extension();
     MeasuredPoints points;
     if (e == ".csv") {

@@ -15,8 +15,8 @@ namespace osteo::tissue {
 namespace {
 
 constexpr std::size_t kFewestPoints = 20, kFewestMarkers = 4;
-constexpr double kCauchy = 2.385;         // widths of noise: 95 % as good as squares where there are no stray points
-constexpr double kMedianOfOne = 1.4826;   // standard deviation over the median distance, along a line
+constexpr double kCauchy = 2.385;          // widths of noise: 95 % as good as squares where there are no stray points
+constexpr double kMedianOfOne = 1.4826;    // standard deviation over the median distance, along a line
 constexpr double kMedianOfThree = 0.6502;  // and in space
 
 std::string shown(double v) {
@@ -102,7 +102,9 @@ SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, s
   residuals(rest_, nowhere.data(), r.data());
   for (std::size_t k = 0; k < views_.size(); ++k) {
     if (const double off = error(k, rest_).median_mm; off > 0.5 * length(hi - lo))
-      throw Error(ExitCode::usage, views_[k].source->name + ": half of its points lie over " + shown(off) + " mm from the body at rest, which is " + shown(length(hi - lo)) + " mm large",
+      throw Error(ExitCode::usage,
+                  views_[k].source->name + ": half of its points lie over " + shown(off) + " mm from the body at rest, which is " +
+                      shown(length(hi - lo)) + " mm large",
                   "bring it into the frame of the mesh (LPS mm) first");
   }
 }
@@ -111,7 +113,8 @@ void SurfaceGoal::check(const MeasuredPoints& v, Vec3 lo, Vec3 hi) const {
   const bool markers = !v.rest_mm.empty();
   const std::size_t fewest = markers ? kFewestMarkers : kFewestPoints;
   if (v.points_mm.size() < fewest)
-    throw Error(ExitCode::usage, v.name + ": it holds " + std::to_string(v.points_mm.size()) + (markers ? " markers, " : " points, ") + std::to_string(fewest) + " are needed");
+    throw Error(ExitCode::usage, v.name + ": it holds " + std::to_string(v.points_mm.size()) + (markers ? " markers, " : " points, ") +
+                                     std::to_string(fewest) + " are needed");
   if ((markers && v.rest_mm.size() != v.points_mm.size()) || (!v.noise_mm.empty() && v.noise_mm.size() != v.points_mm.size()))
     throw Error(ExitCode::usage, v.name + ": not every point has its rest or its noise");
   for (std::size_t p = 0; p < v.points_mm.size(); ++p) {
@@ -130,7 +133,8 @@ void SurfaceGoal::check(const MeasuredPoints& v, Vec3 lo, Vec3 hi) const {
     whole = std::hypot(whole, hi[a] - lo[a]);
   }
   if (measured > 10 * whole || measured < 0.1 * whole)
-    throw Error(ExitCode::usage, v.name + ": it is " + shown(measured) + " mm large, the body " + shown(whole) + " mm: not the same body, or not in mm",
+    throw Error(ExitCode::usage,
+                v.name + ": it is " + shown(measured) + " mm large, the body " + shown(whole) + " mm: not the same body, or not in mm",
                 "give it in LPS mm; a view that is smaller than a tenth of the body says too little");
 }
 
@@ -308,7 +312,8 @@ void SurfaceGoal::align(std::span<const Vec3> shape, double* own) {
     widen_by_noise();
     residuals(shape, own, r.data());
     by_own(j.data(), this->own());
-    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> m(j.data(), static_cast<Eigen::Index>(rows_), width);
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> m(
+        j.data(), static_cast<Eigen::Index>(rows_), width);
     const Eigen::Map<const Eigen::VectorXd> v(r.data(), static_cast<Eigen::Index>(rows_));
     Eigen::MatrixXd h = m.transpose() * m;
     // What a flat view leaves open stays.

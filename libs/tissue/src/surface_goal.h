@@ -21,10 +21,10 @@ class SurfaceGoal final : public Goal {
     std::vector<std::size_t> drawn;  // of the source's points
     std::vector<double> weight;      // noise over the median noise
     std::size_t first_row = 0;
-    Vec3 centre;                      // poses turn about it
-    double turn = 0, shift = 0;       // of an own parameter of 1: radians, mm
-    double sigma_mm = 0;              // robust, of what was left of the last shape
-    double width_mm = 0;              // of the loss
+    Vec3 centre;                 // poses turn about it
+    double turn = 0, shift = 0;  // of an own parameter of 1: radians, mm
+    double sigma_mm = 0;         // robust, of what was left of the last shape
+    double width_mm = 0;         // of the loss
     [[nodiscard]] bool markers() const { return !source->rest_mm.empty(); }
     [[nodiscard]] std::size_t rows() const { return drawn.size() * (markers() ? 3 : 1); }
   };
@@ -48,6 +48,8 @@ class SurfaceGoal final : public Goal {
   [[nodiscard]] Vec3 left(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].left; }
   // Where a view's points lie on the body, by the pose of the last shape.
   [[nodiscard]] Vec3 placed(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].at; }
+  // The triangle of the surface that it is nearest to; of clouds.
+  [[nodiscard]] std::uint32_t nearest(std::size_t view, std::size_t point) const { return seen_[seen_at_[view] + point].triangle; }
   [[nodiscard]] MeasuredError error(std::size_t view, std::span<const Vec3> shape) const;
   [[nodiscard]] std::vector<Vec3> moved(std::span<const Vec3> shape) const;  // the surface's points
   [[nodiscard]] const BodySurface& surface() const { return surface_; }

@@ -12,8 +12,8 @@ namespace osteo::test {
 
 struct Scan {
   std::size_t points = 2000;
-  double noise_mm = 0;      ///< in each coordinate
-  double stray_share = 0;   ///< of the points: anywhere in the body's box, enlarged by a fifth to all sides
+  double noise_mm = 0;     ///< in each coordinate
+  double stray_share = 0;  ///< of the points: anywhere in the body's box, enlarged by a fifth to all sides
   std::function<bool(Vec3 outwards)> sees = [](Vec3) { return true; };  ///< a triangle of the body at rest
   unsigned seed = 1;
 };
@@ -34,9 +34,9 @@ inline MeasuredPoints scanned(const std::string& name, const Block& b, std::span
     faces.push_back({moved[of[t[0]]], moved[of[t[1]]], moved[of[t[2]]]});
     area.push_back(length(cross(faces.back()[1] - faces.back()[0], faces.back()[2] - faces.back()[0])) + (area.empty() ? 0 : area.back()));
     for (const Vec3& p : faces.back())
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], p[a]);
-        hi[a] = std::max(hi[a], p[a]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        lo[k] = std::min(lo[k], p[k]);
+        hi[k] = std::max(hi[k], p[k]);
       }
   }
   std::mt19937 random(scan.seed);

@@ -51,8 +51,8 @@ struct MeasuredCase {
 };
 
 struct MeasuredOptions {
-  CalibrateOptions calibrate;   ///< `starts` and `samples` are not used; `pull` and `smooth` are shares of the surface's RMS movement
-  bool find_pose = false;       ///< each view may lie elsewhere by a small rigid motion, which is found too
+  CalibrateOptions calibrate;      ///< `starts` and `samples` are not used; `pull` and `smooth` are shares of the surface's RMS movement
+  bool find_pose = false;          ///< each view may lie elsewhere by a small rigid motion, which is found too
   std::size_t most_points = 5000;  ///< of a cloud: of more, so many are drawn at random
   /// Of each constraint, which group it is in (-1: none): groups get a mean stiffness with its interval.
   std::vector<int> group_of;
@@ -60,20 +60,20 @@ struct MeasuredOptions {
 
 /// How far what was measured lies from a shape. Of markers: from where they should be.
 struct MeasuredError {
-  double rms_mm = 0;       ///< of the points that are used
-  double median_mm = 0;    ///< of all
+  double rms_mm = 0;        ///< of the points that are used
+  double median_mm = 0;     ///< of all
   double moved_rms_mm = 0;  ///< of the surface's points, in the shape
 };
 
 struct MeasuredView {
   std::string name;
-  std::size_t load = 0;    ///< of the cases
+  std::size_t load = 0;  ///< of the cases
   bool markers = false;
   std::size_t points = 0, drawn = 0;  ///< in the file; used in the fit
   std::size_t rejected = 0;           ///< of those: further than four times the noise from the fitted surface
   MeasuredError before, after;        ///< closed form as the problem has it; fitted
   double noise_mm = 0;                ///< robust standard deviation along the normal of what is left (markers: along an axis)
-  double correlation = 0;  ///< of what is left at a point with that at the nearest other one: above 0, it is not noise alone
+  double correlation = 0;             ///< of what is left at a point with that at the nearest other one: above 0, it is not noise alone
   /// How much of the surface, as far as it moves by over a tenth of the most, has points near it.
   double seen_share = 0;
   std::array<double, 3> turned_deg{}, shifted_mm{};  ///< find_pose: what brings it onto the body, turned about its middle, in LPS
@@ -85,7 +85,7 @@ struct LogStiffness {
 };
 
 struct MeasuredCalibration {
-  Calibration fit;      ///< `before`, `after`, and `uncertainty` are left empty: they need the truth
+  Calibration fit;       ///< `before`, `after`, and `uncertainty` are left empty: they need the truth
   double level_log = 0;  ///< of the one factor on the closed form that explains most
   int rounds = 0;        ///< of fits, each with the noise that the last one found
   std::vector<MeasuredView> views;
