@@ -65,7 +65,7 @@ void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points,
     if (v.noise_mm > 0.3 * v.after.moved_rms_mm)
       context.warn(v.name + ": what is left (" + format_number(rounded(v.noise_mm)) + " mm) is not small against the movement (" +
                    format_number(rounded(v.after.moved_rms_mm)) + " mm): push harder, or measure better");
-    if (v.correlation > 0.5)
+    if (v.correlation > 0.5 && v.noise_mm > 0.03 * v.after.moved_rms_mm)
       context.warn(
           v.name + ": what the fit leaves (" + format_number(rounded(v.noise_mm)) +
           " mm) is no noise, it goes together at neighbouring points (correlation " + format_number(rounded(v.correlation)) +

@@ -281,9 +281,9 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   fit.result.solves = level.solves;
   for (int i = 0; i < fit.parameters(); ++i) at.push_back(fit.seed(i, kStarts[0]));
   for (const auto& pose : start.own) at.insert(at.end(), pose.begin(), pose.end());
-  for (SurfaceGoal* const goal : goals) {
-    goal->set_scale(1 / (size * std::sqrt(static_cast<double>(rows))));
-    goal->widen_by_noise();
+  for (std::size_t n = 0; n < goals.size(); ++n) {
+    goals[n]->set_scale(1 / (size * std::sqrt(static_cast<double>(rows))));
+    goals[n]->widen_by_noise(start.shapes[n]);
   }
 
   const auto width = static_cast<std::size_t>(fit.width());
@@ -294,7 +294,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     const auto one = Clock::now();
     evaluate();
     // A few factors end after some steps; a map is a valley, gone along once for the shape and twice more for the noise.
-    const double steps = fit.parameters() > 8 ? 45 : 12;
+    const double steps = fit.parameters() > 8 ? 25 : 12;
     result.estimate_s = steps * (seconds_since(one) + level.solve_s + 2e-9 * static_cast<double>(residuals.size() * width * width));
     const std::string told = std::to_string(rows) + " distances and " + std::to_string(width) + " parameters: the fit takes about " +
                              format_number(std::max(1.0, std::round(result.estimate_s))) + " s";
@@ -320,10 +320,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     // The last evaluation of a descent need not be where it ended.
     evaluate();
     bool stays = true;
-    for (SurfaceGoal* const goal : goals) {
+    for (std::size_t n = 0; n < goals.size(); ++n) {
+      SurfaceGoal* const goal = goals[n];
       std::vector<double> before;
       for (const auto& v : goal->views()) before.push_back(v.sigma_mm);
-      goal->widen_by_noise();
+      goal->widen_by_noise(fit.shapes()[n]);
       for (std::size_t k = 0; k < before.size(); ++k) stays = stays && std::abs(goal->views()[k].sigma_mm - before[k]) < 0.1 * before[k];
     }
     if (stays || result.rounds == kMostRounds) break;
@@ -457,6 +458,12 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   std::vector<double> own(at.begin(), at.begin() + fit.parameters());
   const std::vector<double> full = fit.all_of(own);
   c.log_factors = full;
+  std::vector<double> unsure(own.size());
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const auto at_i = static_cast<Eigen::Index>(i);
+    unsure[i] = std::sqrt(std::max(0.0, covariance(at_i, at_i)));
+  }
+  c.uncertainty = fit.all_of(unsure);
   if (shared) {
     c.log_stiffness.assign(full.begin(), full.begin() + static_cast<std::ptrdiff_t>(nodes));
     c.log_factors.clear();

@@ -56,7 +56,8 @@ std::vector<MeasuredOfLoad> read_measured(const fs::path& path, const std::vecto
   std::vector<fs::path> files;
   if (fs::is_directory(path)) {
     for (const auto& entry : fs::directory_iterator(path)) {
-      if (!entry.path().filename().string().starts_with(".")) files.push_back(entry.path());
+      const std::string name = entry.path().filename().string();
+      if (!name.starts_with(".") && !name.ends_with(".prov.json")) files.push_back(entry.path());
     }
     std::sort(files.begin(), files.end());
     if (files.empty())

@@ -15,9 +15,12 @@ namespace osteo::tissue {
 namespace {
 
 constexpr std::size_t kFewestPoints = 20, kFewestMarkers = 4;
-constexpr double kCauchy = 2.385;          // widths of noise: 95 % as good as squares where there are no stray points
-constexpr double kMedianOfOne = 1.4826;    // standard deviation over the median distance, along a line
-constexpr double kMedianOfThree = 0.6502;  // and in space
+constexpr double kCauchy = 2.385;  // widths of noise: 95 % as good as squares where there are no stray points
+// Two thirds of all distances lie below the standard deviation along a line, and below so many of an axis's in space. Not the median: what
+// hardly moves is hardly off, and would pass for all of the noise.
+constexpr double kTwoThirds = 0.6827, kOfThree = 1.878;
+constexpr double kStray = 4;
+constexpr double kLeastNoise = 0.005;  // of the RMS movement: no fast model is nearer to a body than that
 
 std::string shown(double v) {
   return format_number(std::round(v * 1000) / 1000);
@@ -30,11 +33,11 @@ Vec3 vec(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-double median(std::vector<double> v) {
+double quantile(std::vector<double> v, double share) {
   if (v.empty()) return 0;
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
+  const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  std::nth_element(v.begin(), at, v.end());
+  return *at;
 }
 
 // A residual whose square is A. Cauchy's loss, and its slope.
@@ -76,7 +79,7 @@ SurfaceGoal::SurfaceGoal(const TissueModel& model, const BodySurface& surface, s
       v.drawn.resize(most);
       std::sort(v.drawn.begin(), v.drawn.end());
     }
-    const double usual = median(source.noise_mm);
+    const double usual = quantile(source.noise_mm, 0.5);
     for (const std::size_t p : v.drawn) {
       v.weight.push_back(source.noise_mm.empty() ? 1 : source.noise_mm[p] / usual);
       v.centre += source.points_mm[p] / static_cast<double>(v.drawn.size());
@@ -292,13 +295,33 @@ std::vector<double> SurfaceGoal::squares() const {
   return all;
 }
 
-void SurfaceGoal::widen_by_noise() {
+void SurfaceGoal::widen_by_noise(std::span<const Vec3> shape) {
+  // Where the surface moves: what is held is on its place whatever the factors are.
+  const std::vector<Vec3> x = moved(shape), rest = moved(rest_);
+  std::vector<double> by(x.size());
+  double most = 0, sum = 0;
+  for (std::size_t p = 0; p < x.size(); ++p) {
+    by[p] = length(x[p] - rest[p]);
+    most = std::max(most, by[p]);
+    sum += by[p] * by[p];
+  }
+  const double least = std::max(1e-4 * views_[0].shift, kLeastNoise * std::sqrt(sum / static_cast<double>(x.size())));
   for (std::size_t k = 0; k < views_.size(); ++k) {
     View& v = views_[k];
-    std::vector<double> off;
-    for (std::size_t p = 0; p < v.drawn.size(); ++p) off.push_back(length(left(k, p)) / v.weight[p]);
-    // A floor for what was made without noise, or the loss would have no width.
-    v.sigma_mm = std::max((v.markers() ? kMedianOfThree : kMedianOfOne) * median(std::move(off)), 1e-4 * v.shift);
+    std::vector<double> off, anywhere;
+    for (std::size_t p = 0; p < v.drawn.size(); ++p) {
+      const Seen& s = seen_[seen_at_[k] + p];
+      anywhere.push_back(length(s.left) / v.weight[p]);
+      double here = 0;
+      if (v.markers()) {
+        for (std::size_t c = 0; c < 4; ++c) here = std::max(here, length(shape[s.corners[c]] - rest_[s.corners[c]]));
+      } else {
+        for (const std::uint32_t c : surface_.triangles[s.triangle]) here = std::max(here, by[c]);
+      }
+      if (here >= 0.1 * most) off.push_back(anywhere.back());
+    }
+    if (off.size() < 10) off = std::move(anywhere);
+    v.sigma_mm = std::max(quantile(std::move(off), kTwoThirds) / (v.markers() ? kOfThree : 1), least);
     v.width_mm = kCauchy * v.sigma_mm * (v.markers() ? std::sqrt(3.0) : 1);
   }
 }
@@ -309,7 +332,7 @@ void SurfaceGoal::align(std::span<const Vec3> shape, double* own) {
   const auto width = static_cast<Eigen::Index>(this->own());
   for (int n = 0; n < 15; ++n) {
     residuals(shape, own, r.data());
-    widen_by_noise();
+    widen_by_noise(shape);
     residuals(shape, own, r.data());
     by_own(j.data(), this->own());
     const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> m(
@@ -330,8 +353,8 @@ MeasuredError SurfaceGoal::error(std::size_t view, std::span<const Vec3> shape) 
   const View& v = views_[view];
   std::vector<double> off;
   for (std::size_t p = 0; p < v.drawn.size(); ++p) off.push_back(length(left(view, p)));
-  e.median_mm = median(off);
-  const double limit = 4 * (v.markers() ? kMedianOfThree * std::sqrt(3.0) : kMedianOfOne) * e.median_mm;
+  e.median_mm = quantile(off, 0.5);
+  const double limit = kStray * quantile(off, kTwoThirds);
   double sum = 0, used = 0;
   for (const double d : off) {
     if (d > limit) continue;

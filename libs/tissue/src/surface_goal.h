@@ -38,8 +38,8 @@ class SurfaceGoal final : public Goal {
   [[nodiscard]] const std::vector<View>& views() const { return views_; }
   // Residuals are distances times this.
   void set_scale(double scale) { scale_ = scale; }
-  // Losses as wide as the noise that the last shape left.
-  void widen_by_noise();
+  // Losses as wide as the noise that the last shape left, which `shape` is.
+  void widen_by_noise(std::span<const Vec3> shape);
   // Poses that bring the views onto a shape, from those given.
   void align(std::span<const Vec3> shape, double* own);
   // Squared distances over weights, of the last shape; a marker's is a third of its square.

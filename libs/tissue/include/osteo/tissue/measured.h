@@ -31,8 +31,8 @@ struct MeasuredOfLoad {
 [[nodiscard]] MeasuredPoints read_measured_csv(std::string_view csv, const std::string& name);
 
 /// A folder of files, or one file, each called like the load that it was measured under: pull.ply, or pull.left.csv and pull.right.csv.
-/// .csv as above; .xyz and .txt: a point a line; .ply, .stl, .obj, .vtp: the points, with triangles or without. Hidden files are passed
-/// over. Errors: usage with the names there are for a file that is called like no load, for a folder with none; as of the readers.
+/// .csv as above; .xyz and .txt: a point a line; .ply, .stl, .obj, .vtp: the points, with triangles or without. Hidden files and
+/// .prov.json are passed over. Errors: usage with the names there are for a file that is called like no load, for a folder with none; as of the readers.
 [[nodiscard]] std::vector<MeasuredOfLoad> read_measured(const std::filesystem::path& path, const std::vector<std::string>& load_names);
 
 /// A surface that moves with the points of a model: each of its points is a mixture of four.
@@ -60,7 +60,7 @@ struct MeasuredOptions {
 
 /// How far what was measured lies from a shape. Of markers: from where they should be.
 struct MeasuredError {
-  double rms_mm = 0;        ///< of the points that are used
+  double rms_mm = 0;        ///< of the points that are within four times what two thirds of them keep to
   double median_mm = 0;     ///< of all
   double moved_rms_mm = 0;  ///< of the surface's points, in the shape
 };
@@ -72,7 +72,7 @@ struct MeasuredView {
   std::size_t points = 0, drawn = 0;  ///< in the file; used in the fit
   std::size_t rejected = 0;           ///< of those: further than four times the noise from the fitted surface
   MeasuredError before, after;        ///< closed form as the problem has it; fitted
-  double noise_mm = 0;                ///< robust standard deviation along the normal of what is left (markers: along an axis)
+  double noise_mm = 0;                ///< robust standard deviation along the normal of what is left where it moves (markers: along an axis)
   double correlation = 0;             ///< of what is left at a point with that at the nearest other one: above 0, it is not noise alone
   /// How much of the surface, as far as it moves by over a tenth of the most, has points near it.
   double seen_share = 0;
@@ -85,7 +85,7 @@ struct LogStiffness {
 };
 
 struct MeasuredCalibration {
-  Calibration fit;       ///< `before`, `after`, and `uncertainty` are left empty: they need the truth
+  Calibration fit;       ///< `before` and `after` are left empty: they need the truth; `uncertainty`: deviations, as below
   double level_log = 0;  ///< of the one factor on the closed form that explains most
   int rounds = 0;        ///< of fits, each with the noise that the last one found
   std::vector<MeasuredView> views;
