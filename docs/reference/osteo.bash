@@ -76,7 +76,7 @@ _osteo() {
     skin) flags="$flags --xml --describe --method --neighbours" ;;
     bone-stiffness) flags="$flags --xml --describe --law --density-per-1000-hu --density-at-0-hu --ash-correction --weight --least-mpa --most-mpa --step-percent --keep-loose --load --order --map-out --report-out" ;;
     fem) flags="$flags --xml --describe --law --order --load --load-steps --tolerance --report-out --inp-out --nodes-out" ;;
-    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --deformed-out --map-out --course-out" ;;
+    calibrate) flags="$flags --xml --describe --fit --law --order --grid-x --grid-y --grid-z --shared-grid --blind --pull --smooth --starts --samples --iterations --check-truth --find-pose --most-points --measured --surface --deformed-out --map-out --course-out" ;;
     simulate) flags="$flags --xml --describe --load --method --seconds --density-kg-m3 --damping-per-s --least-step-ms --step-ms --until-rest --tool-radius-mm --tool-from-mm --tool-to-mm --tool-stiffness-n-per-mm --obstacle-stiffness-n-per-mm --constants --obstacle --report-out" ;;
     fit-damping) flags="$flags --xml --describe --load --at-mm --along --method --step-ms --density-kg-m3 --fit-stiffness --release-s --fit-release --constants --fitted-out" ;;
     saw) flags="$flags --xml --describe --at-mm --from-centre --normal --along --kerf-mm --length-mm --depth-mm" ;;

@@ -335,6 +335,7 @@ void bench_tissue(const Context& context) {
   bench::tissue_time();
   bench::tissue_pressed();
   two_materials(context);
+  bench::tissue_measured(context);
   incompressible();
   gear_calibration(context);
 }

@@ -11,9 +11,11 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <string>
+#include <tuple>
 
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
@@ -56,14 +58,7 @@ bool holds_no_facet(const fs::path& path) {
          head.find("facet") == std::string::npos && head.find("FACET") == std::string::npos;
 }
 
-}  // namespace
-
-bool is_surface_file(const fs::path& path) {
-  const auto e = path.extension();
-  return e == ".ply" || e == ".stl" || e == ".obj" || e == ".vtp";
-}
-
-Surface load_surface(const fs::path& path) {
+vtkSmartPointer<vtkPolyData> read_poly(const fs::path& path) {
   require_readable(path);
   const auto e = path.extension();
   vtkSmartPointer<vtkPolyData> poly;
@@ -78,6 +73,18 @@ Surface load_surface(const fs::path& path) {
   if (e == ".vtp") poly = read_with<vtkXMLPolyDataReader>(path);
   if (!poly)
     throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a surface file by its name", "surfaces are .ply .stl .obj .vtp");
+  return poly;
+}
+
+}  // namespace
+
+bool is_surface_file(const fs::path& path) {
+  const auto e = path.extension();
+  return e == ".ply" || e == ".stl" || e == ".obj" || e == ".vtp";
+}
+
+Surface load_surface(const fs::path& path) {
+  const vtkSmartPointer<vtkPolyData> poly = read_poly(path);
   try {
     auto mesh = std::make_shared<TriMesh>(mesh_from_vtk(poly));
     if (mesh->triangles.empty()) throw Error(ExitCode::corrupt, "it holds no triangles");
@@ -85,6 +92,24 @@ Surface load_surface(const fs::path& path) {
   } catch (const Error& error) {
     throw error.in("'" + path.string() + "'");
   }
+}
+
+std::vector<Vec3> load_surface_points(const fs::path& path) {
+  const vtkSmartPointer<vtkPolyData> poly = read_poly(path);
+  std::vector<Vec3> points(static_cast<std::size_t>(poly->GetNumberOfPoints()));
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    double x[3];
+    poly->GetPoint(static_cast<vtkIdType>(p), x);
+    points[p] = {x[0], x[1], x[2]};
+    if (!std::isfinite(dot(points[p], points[p])))
+      throw Error(ExitCode::corrupt, "'" + path.string() + "': point " + std::to_string(p) + " has a coordinate that is no finite number");
+  }
+  // Flat shading writes a point for each of its triangles.
+  const auto before = [](Vec3 a, Vec3 b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); };
+  std::sort(points.begin(), points.end(), before);
+  points.erase(std::unique(points.begin(), points.end(), [&](Vec3 a, Vec3 b) { return !before(a, b) && !before(b, a); }), points.end());
+  if (points.empty()) throw Error(ExitCode::corrupt, "'" + path.string() + "': it holds no points");
+  return points;
 }
 
 void save_surface(const TriMesh& mesh, const fs::path& path) {

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
 
+#include "calibrate_parts.h"
 #include "course_svg.h"
 #include "osteo/base/error.h"
 #include "osteo/base/json_document.h"
@@ -15,64 +15,6 @@ namespace osteo {
 using namespace tissue;
 
 namespace {
-
-// What Young's modulus each constraint's stiffness would be in closed form, in kPa.
-std::vector<double> stiffness_kpa(const TissueModel& model, const TissueModel& uniform, const Material& of_uniform) {
-  std::vector<double> all;
-  for (std::size_t c = 0; c < model.constraints().size(); ++c)
-    all.push_back(1000 * of_uniform.young_mpa * model.constraints()[c].stiffness / uniform.base_stiffness(c));
-  return all;
-}
-
-bool is_edge(const TissueModel::Constraint& c) {
-  return c.kind == TissueClass::axis_edge || c.kind == TissueClass::diagonal_edge;
-}
-
-// At each point, the geometric mean over its edges.
-Tets stiffness_map(const TetMesh& mesh, const TissueModel& model, std::span<const double> kpa) {
-  TetMesh map;
-  map.points_mm = mesh.points_mm;
-  map.tets = mesh.tets;
-  map.values_name = "stiffness_kpa";
-  std::vector<double> sum(mesh.points_mm.size()), count(sum.size());
-  for (std::size_t c = 0; c < kpa.size(); ++c) {
-    if (!is_edge(model.constraints()[c])) continue;
-    for (const std::uint32_t p : model.nodes(c)) {
-      sum[p] += std::log(kpa[c]);
-      count[p] += 1;
-    }
-  }
-  for (std::size_t p = 0; p < sum.size(); ++p) map.values.push_back(static_cast<float>(count[p] > 0 ? std::exp(sum[p] / count[p]) : 0));
-  return std::make_shared<const TetMesh>(std::move(map));
-}
-
-// What was learnt of each material: the geometric mean over edges all of whose tetrahedra, and theirs, are of it.
-Json learnt(const TissueProblem& problem, const TissueModel& model, std::span<const double> kpa) {
-  constexpr std::size_t kMixed = ~std::size_t{0}, kUnseen = kMixed - 1;
-  std::vector<std::size_t> of_point(model.point_count(), kUnseen);
-  const auto same = [&](std::size_t a, std::size_t b) {
-    return problem.materials[a].young_mpa == problem.materials[b].young_mpa && problem.materials[a].poisson == problem.materials[b].poisson;
-  };
-  for (std::size_t t = 0; t < problem.materials.size() && problem.materials.size() > 1; ++t) {
-    for (const std::uint32_t p : model.tets()[t]) {
-      if (of_point[p] == kUnseen) of_point[p] = t;
-      if (of_point[p] != kMixed && !same(of_point[p], t)) of_point[p] = kMixed;
-    }
-  }
-  std::map<double, std::pair<double, std::size_t>> sums;  // by true modulus
-  for (std::size_t c = 0; c < kpa.size(); ++c) {
-    if (!is_edge(model.constraints()[c])) continue;
-    const std::size_t a = of_point[model.constraints()[c].node[0]], b = of_point[model.constraints()[c].node[1]];
-    if (a >= kUnseen || b >= kUnseen || !same(a, b)) continue;
-    auto& [sum, count] = sums[1000 * problem.materials[a].young_mpa];
-    sum += std::log(kpa[c]);
-    ++count;
-  }
-  Json all = Json::list();
-  for (const auto& [young, s] : sums)
-    all.push_back({{"young_kpa", young}, {"learnt_kpa", std::exp(s.first / static_cast<double>(s.second))}, {"edges", s.second}});
-  return all;
-}
 
 // Finite elements under one load after another, all held alike.
 class Truth {
@@ -115,7 +57,7 @@ StageInfo CalibrateStage::info() {
   return {
       .name = "calibrate",
       .version = 2,
-      .synopsis = "constants of the fast tissue model, fitted to finite elements",
+      .synopsis = "constants of the fast tissue model, fitted to finite elements or to what was measured",
       .description =
           "The body of voxels (tetrahedralize --method grid) under the problem's loads is solved by finite elements; the constants of the "
           "distance and volume model are then fitted to it, from their closed form, with exact derivatives through the equilibrium "
@@ -124,9 +66,17 @@ StageInfo CalibrateStage::info() {
           "against quadratic tetrahedra, and with --check-truth finer ones: a residual below that says nothing); uncertain factors; the "
           "course of the fit. A map of stiffness (--grid-x, -y, -z) finds what the "
           "regions of "
-          "a body are made of, also without being told of them (--blind).",
+          "a body are made of, also without being told of them (--blind). With --measured the truth is what was measured: clouds of points "
+          "on the deformed surface (.ply .stl .obj .vtp .csv .xyz), with noise, stray points and only a part of it seen, or markers whose "
+          "places at rest are known (.csv with x0_mm, y0_mm, z0_mm). The report then has distances before and after, the noise that was "
+          "found, points that were rejected, how much of the surface was seen, and 95 % intervals.",
       .inputs = {{"mesh", {DataKind::tets}, "voxels of five tetrahedra each"},
-                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"}},
+                 {"problem", {DataKind::document}, "materials, what is fixed, loads, in JSON or .inp"},
+                 {"measured",
+                  {DataKind::source},
+                  "instead of finite elements: points of the deformed body, a file or a folder of them, called like their loads",
+                  true},
+                 {"surface", {DataKind::surface}, "measured: the body's surface at rest, which the mesh stands for", true}},
       .outputs = {{"constants", {DataKind::document}, "factors and report, in JSON"},
                   {"deformed", {DataKind::tets}, "the calibrated model under the first fitted load", true},
                   {"map", {DataKind::tets}, "the mesh with the learnt stiffness at its points (snapshot draws it)", true},
@@ -144,12 +94,15 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   TissueProblem known = problem;
   if (p.blind) known.materials.assign(1, problem.general);
   TissueModel model = model_of_problem(mesh, known);
-  std::vector<std::size_t> fitted;
-  for (std::size_t at = 0; at < p.fit.size();) {
-    const std::size_t comma = std::min(p.fit.find(',', at), p.fit.size());
-    fitted.push_back(load_named(problem, p.fit.substr(at, comma - at)));
-    at = comma + 1;
+  std::vector<std::size_t> fitted = loads_named(problem, p.fit);
+  if (const auto* const measured = std::get_if<Source>(&inputs[2]); measured != nullptr) {
+    const auto* const surface = std::get_if<Surface>(&inputs[3]);
+    return calibrate_to_measured(p, mesh, problem, std::move(model), measured->path, surface != nullptr ? surface->get() : nullptr,
+                                 std::move(fitted), context);
   }
+  if (std::get_if<Surface>(&inputs[3]) != nullptr || p.find_pose || p.most_points != CalibrateParams{}.most_points)
+    throw Error(ExitCode::usage, "--surface, --find-pose and --most-points have no effect without --measured",
+                "finite elements are compared point by point");
   if (fitted.empty()) fitted.push_back(0);
   for (std::size_t n = 0; n < problem.loads.size(); ++n) {
     if (!problem.loads[n].moved.empty() || !problem.loads[n].contacts.empty())
@@ -215,7 +168,7 @@ std::vector<Data> CalibrateStage::run(const Params& p, std::span<const Data> inp
   if (p.blind) j["base"] = {{"young_kpa", 1000 * problem.general.young_mpa}, {"poisson", problem.general.poisson}};
   const TissueModel uniform = TissueModel::of_voxels(points, tets, std::span(&problem.general, 1));
   const std::vector<double> kpa = stiffness_kpa(model, uniform, problem.general);
-  if (problem.materials.size() > 1) j["learnt"] = learnt(problem, model, kpa);
+  if (problem.materials.size() > 1) j["learnt"] = learnt(material_edges(problem, model), kpa);
   if (c.log_stiffness.size() > 1) j["log_stiffness"] = c.log_stiffness;
   j["uncertainty_of_parameters"] = c.uncertainty;
   j["converged"] = c.converged;

@@ -25,7 +25,7 @@ class Cost final : public ceres::CostFunction {
  public:
   explicit Cost(Fit& fit) : fit_(fit) {
     set_num_residuals(fit.residuals());
-    mutable_parameter_block_sizes()->push_back(fit.parameters());
+    mutable_parameter_block_sizes()->push_back(fit.width());
   }
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     double* const jacobian = jacobians != nullptr ? jacobians[0] : nullptr;
@@ -124,6 +124,39 @@ bool has_ceres() {
   return true;
 }
 
+Descent tissue::descend(Fit& fit, std::vector<double> logs, const CalibrateOptions& options, const Context& context) {
+  ceres::Problem problem;
+  problem.AddResidualBlock(new Cost(fit), nullptr, logs.data());
+  for (int i = 0; i < fit.parameters(); ++i) {
+    problem.SetParameterLowerBound(logs.data(), i, options.least_log);
+    problem.SetParameterUpperBound(logs.data(), i, options.most_log);
+  }
+  Watch watch(logs, context);
+  ceres::Solver::Options o;
+  o.linear_solver_type = ceres::DENSE_QR;
+  // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows
+  // better.
+  o.trust_region_strategy_type = fit.parameters() > 8 ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
+  o.max_num_iterations = options.iterations;
+  o.function_tolerance = options.tolerance;
+  o.parameter_tolerance = 1e-5;
+  o.num_threads = 1;
+  o.logging_type = ceres::SILENT;
+  o.callbacks.push_back(&watch);
+  o.update_state_every_iteration = true;
+  ceres::Solver::Summary summary;
+  ceres::Solve(o, &problem, &summary);
+  Descent d{summary.IsSolutionUsable(),
+            summary.termination_type == ceres::CONVERGENCE,
+            {},
+            summary.final_cost,
+            std::move(logs),
+            std::move(watch.cost),
+            std::move(watch.course)};
+  if (!d.converged) d.why = summary.message;
+  return d;
+}
+
 Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context) {
   if (cases.empty()) throw Error(ExitCode::usage, "a calibration needs at least one load");
   const auto begin = std::chrono::steady_clock::now();
@@ -144,7 +177,6 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
   }
   std::vector<double> best;
   double best_cost = 1e300;
-  ceres::Solver::Summary best_summary;
   std::vector<std::array<double, kTissueClasses>> starts(kStarts, kStarts + std::clamp(options.starts, 1, 3));
   const auto logs_of = [&](const std::array<double, kTissueClasses>& classes) {
     std::vector<double> logs(n);
@@ -167,43 +199,20 @@ Calibration calibrate(TissueModel& model, std::span<const CalibrationCase> cases
     }
   }
   for (const auto& start : starts) {
-    std::vector<double> logs = logs_of(start);
-    ceres::Problem problem;
-    problem.AddResidualBlock(new Cost(fit), nullptr, logs.data());
-    for (std::size_t i = 0; i < n; ++i) {
-      problem.SetParameterLowerBound(logs.data(), static_cast<int>(i), options.least_log);
-      problem.SetParameterUpperBound(logs.data(), static_cast<int>(i), options.most_log);
-    }
-    Watch watch(logs, context);
-    ceres::Solver::Options o;
-    o.linear_solver_type = ceres::DENSE_QR;
-    // A few factors from the closed form are nearly a linear problem; a map far from uniform is a long valley, which the dogleg follows
-    // better.
-    o.trust_region_strategy_type = n > 8 ? ceres::DOGLEG : ceres::LEVENBERG_MARQUARDT;
-    o.max_num_iterations = options.iterations;
-    o.function_tolerance = options.tolerance;
-    o.parameter_tolerance = 1e-5;
-    o.num_threads = 1;
-    o.logging_type = ceres::SILENT;
-    o.callbacks.push_back(&watch);
-    o.update_state_every_iteration = true;
-    ceres::Solver::Summary summary;
-    ceres::Solve(o, &problem, &summary);
-    if (summary.IsSolutionUsable() && summary.final_cost < best_cost) {
-      best_cost = summary.final_cost;
-      best = logs;
-      best_summary = summary;
-      result.cost = watch.cost;
-      result.course = watch.course;
-    }
+    Descent d = descend(fit, logs_of(start), options, context);
+    if (!d.usable || !(d.cost < best_cost)) continue;
+    best_cost = d.cost;
+    best = d.parameters;
+    result.cost = std::move(d.costs);
+    result.course = std::move(d.course);
+    result.converged = d.converged;
+    result.why = d.why;
   }
   if (best.empty()) {
     model.scale({1, 1, 0, 1});
     result.why = "no factors were found with which the model comes to rest under these loads";
     return result;
   }
-  result.converged = best_summary.termination_type == ceres::CONVERGENCE;
-  if (!result.converged) result.why = best_summary.message;
   // Once more at the answer: shapes and Jacobian.
   std::vector<double> residuals(static_cast<std::size_t>(fit.residuals())), jacobian(residuals.size() * n);
   double* rows = jacobian.data();

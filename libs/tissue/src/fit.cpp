@@ -10,6 +10,54 @@ namespace {
 
 constexpr double kBorder = 0.3;  // log: differences beyond are taken for borders
 
+// 1 / the size of each case.
+std::vector<double> scales_of(const TissueModel& model, std::span<const CalibrationCase> cases) {
+  std::vector<double> scales;
+  for (const CalibrationCase& c : cases) {
+    if (c.truth_mm.size() != model.point_count())
+      throw Error(ExitCode::usage,
+                  "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
+    double sum = 0;
+    for (std::size_t p = 0; p < c.truth_mm.size(); ++p) sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
+    if (!(sum > 0) || !std::isfinite(sum))
+      throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
+    const double rms = std::sqrt(sum / static_cast<double>(c.truth_mm.size()));
+    scales.push_back(1 / (rms * std::sqrt(static_cast<double>(c.truth_mm.size() * cases.size()))));
+  }
+  return scales;
+}
+
+class NodeGoal final : public Goal {
+ public:
+  NodeGoal(std::span<const Vec3> truth, double scale) : truth_(truth), scale_(scale) {}
+  [[nodiscard]] std::size_t rows() const override { return 3 * truth_.size(); }
+  void residuals(std::span<const Vec3> shape, const double*, double* out) override {
+    for (std::size_t p = 0; p < truth_.size(); ++p)
+      for (std::size_t a = 0; a < 3; ++a) *out++ = (shape[p][a] - truth_[p][a]) * scale_;
+  }
+  void along(std::span<const Vec3> du, double* column, std::size_t stride) const override {
+    for (std::size_t p = 0; p < truth_.size(); ++p)
+      for (std::size_t a = 0; a < 3; ++a, column += stride) *column = du[p][a] * scale_;
+  }
+
+ private:
+  std::span<const Vec3> truth_;
+  double scale_;
+};
+
+std::vector<TissueLoad> loads_of(std::span<const CalibrationCase> cases) {
+  std::vector<TissueLoad> loads;
+  for (const CalibrationCase& c : cases) loads.push_back(c.load);
+  return loads;
+}
+
+std::vector<std::unique_ptr<Goal>> goals_of(const TissueModel& model, std::span<const CalibrationCase> cases) {
+  const std::vector<double> scales = scales_of(model, cases);
+  std::vector<std::unique_ptr<Goal>> goals;
+  for (std::size_t n = 0; n < cases.size(); ++n) goals.push_back(std::make_unique<NodeGoal>(cases[n].truth_mm, scales[n]));
+  return goals;
+}
+
 }  // namespace
 
 std::size_t grid_points(const std::array<int, 3>& grid) {
@@ -59,29 +107,36 @@ std::vector<Share> shares(const TissueModel& model, const std::array<int, 3>& gr
   return all;
 }
 
-Fit::Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
-    : model_(model), cases_(cases), options_(options), context_(context), solver_(model, model.rest(), cases.front().load) {
+Fit::Fit(TissueModel& model, std::vector<TissueLoad> loads, std::vector<std::unique_ptr<Goal>> goals, double level,
+         const CalibrateOptions& options, const Context& context)
+    : model_(model),
+      loads_(std::move(loads)),
+      goals_(std::move(goals)),
+      options_(options),
+      context_(context),
+      solver_(model, model.rest(), loads_.front()),
+      shape_(loads_.size(), model.rest()),
+      level_(level) {
   const auto held = [&](const TissueLoad& load) {
     std::vector<std::uint8_t> axes(model.point_count());
     for (const std::uint32_t p : load.fixed) axes.at(p) = 7;
     for (const Slider& s : load.sliders) axes.at(s.point) = static_cast<std::uint8_t>(axes.at(s.point) | s.held);
     return axes;
   };
-  for (const CalibrationCase& c : cases) {
-    if (held(c.load) != held(cases.front().load)) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
-    if (c.truth_mm.size() != model.point_count())
-      throw Error(ExitCode::usage,
-                  "the truth has " + std::to_string(c.truth_mm.size()) + " points, the model " + std::to_string(model.point_count()));
-    double sum = 0;
-    for (std::size_t p = 0; p < c.truth_mm.size(); ++p) sum += dot(c.truth_mm[p] - model.rest()[p], c.truth_mm[p] - model.rest()[p]);
-    if (!(sum > 0) || !std::isfinite(sum))
-      throw Error(ExitCode::usage, "a load of the calibration moves nothing, or its truth is not finite");
-    const double rms = std::sqrt(sum / static_cast<double>(c.truth_mm.size()));
-    scale_.push_back(1 / (rms * std::sqrt(static_cast<double>(c.truth_mm.size() * cases.size()))));
-    shape_.push_back(model.rest());
+  for (const TissueLoad& load : loads_) {
+    if (held(load) != held(loads_.front())) throw Error(ExitCode::usage, "all loads of a calibration must fix the same points");
+  }
+  for (const auto& goal : goals_) {
+    goal_rows_ += goal->rows();
+    owns_ += goal->own();
   }
   lay_grid();
-  find_level();
+  if (nodes_ == 1 || !options_.shared_grid) class_level_ = level;
+}
+
+Fit::Fit(TissueModel& model, std::span<const CalibrationCase> cases, const CalibrateOptions& options, const Context& context)
+    : Fit(model, loads_of(cases), goals_of(model, cases), 0, options, context) {
+  find_level(cases, scales_of(model, cases));
 }
 
 double Fit::cost(const std::vector<double>& logs) {
@@ -92,18 +147,18 @@ double Fit::cost(const std::vector<double>& logs) {
   return sum;
 }
 
-void Fit::find_level() {
+void Fit::find_level(std::span<const CalibrationCase> cases, std::span<const double> scale) {
   if (nodes_ == 1 || !options_.shared_grid) return;
   for (int round = 0; round < 3; ++round) {
     model_.scale({std::exp(level_), std::exp(level_), 0, std::exp(level_)});
     double own = 0, both = 0;
-    for (std::size_t n = 0; n < cases_.size(); ++n) {
-      const Equilibrium at = solver_.solve(model_, shape_[n], cases_[n].load.forces_n, options_.equilibrium, context_);
+    for (std::size_t n = 0; n < cases.size(); ++n) {
+      const Equilibrium at = solver_.solve(model_, shape_[n], cases[n].load.forces_n, options_.equilibrium, context_);
       ++result.solves;
       if (!at.converged) return;
       shape_[n] = at.points_mm;
       for (std::size_t p = 0; p < at.points_mm.size(); ++p) {
-        const Vec3 u = (at.points_mm[p] - model_.rest()[p]) * scale_[n], t = (cases_[n].truth_mm[p] - model_.rest()[p]) * scale_[n];
+        const Vec3 u = (at.points_mm[p] - model_.rest()[p]) * scale[n], t = (cases[n].truth_mm[p] - model_.rest()[p]) * scale[n];
         own += dot(u, u);
         both += dot(u, t);
       }
@@ -127,46 +182,48 @@ void Fit::set(const double* logs) {
 
 bool Fit::evaluate(const double* logs, double* residuals, double** jacobian_rows) {
   set(logs);
-  const std::size_t points = model_.point_count(), parameters = used_.size();
-  double* out = residuals;
-  for (std::size_t n = 0; n < cases_.size(); ++n) {
-    const Equilibrium at = solver_.solve(model_, shape_[n], cases_[n].load.forces_n, options_.equilibrium, context_);
+  const std::size_t parameters = used_.size(), wide = parameters + owns_;
+  if (jacobian_rows != nullptr) std::fill(*jacobian_rows, *jacobian_rows + static_cast<std::size_t>(this->residuals()) * wide, 0.0);
+  std::size_t row = 0, own = parameters;
+  for (std::size_t n = 0; n < loads_.size(); ++n) {
+    const Equilibrium at = solver_.solve(model_, shape_[n], loads_[n].forces_n, options_.equilibrium, context_);
     // Where it is at rest already (the same factors again, for their Jacobian) nothing was solved.
     if (at.iterations > 0) ++result.solves;
     if (!at.converged) {
       // From rest, before giving it up.
       ++result.failed_solves;
       ++result.solves;
-      const Equilibrium again = solver_.solve(model_, model_.rest(), cases_[n].load.forces_n, options_.equilibrium, context_);
+      const Equilibrium again = solver_.solve(model_, model_.rest(), loads_[n].forces_n, options_.equilibrium, context_);
       if (!again.converged) return false;
       shape_[n] = again.points_mm;
     } else {
       shape_[n] = at.points_mm;
     }
-    for (std::size_t p = 0; p < points; ++p)
-      for (std::size_t a = 0; a < 3; ++a) *out++ = (shape_[n][p][a] - cases_[n].truth_mm[p][a]) * scale_[n];
-    if (jacobian_rows != nullptr) differentiate(n, *jacobian_rows, 3 * points * n);
+    goals_[n]->residuals(shape_[n], logs + own, residuals + row);
+    if (jacobian_rows != nullptr) {
+      differentiate(n, *jacobian_rows, row);
+      if (goals_[n]->own() > 0) goals_[n]->by_own(*jacobian_rows + row * wide + own, wide);
+    }
+    row += goals_[n]->rows();
+    own += goals_[n]->own();
   }
-  for (std::size_t i = 0; i < parameters; ++i) {
-    const double weight = pull_of(static_cast<int>(i));
-    *out++ = weight * (logs[i] - pull_goal(static_cast<int>(i)));
-    if (jacobian_rows == nullptr) continue;
-    double* const row = *jacobian_rows + (3 * points * cases_.size() + i) * parameters;
-    std::fill(row, row + parameters, 0.0);
-    row[i] = weight;
+  // What is a goal's own is held by next to nothing: only where nothing measured says where it lies.
+  for (std::size_t i = 0; i < wide; ++i, ++row) {
+    const double weight = i < parameters ? pull_of(static_cast<int>(i)) : 1e-4;
+    residuals[row] = weight * (logs[i] - (i < parameters ? pull_goal(static_cast<int>(i)) : 0));
+    if (jacobian_rows != nullptr) (*jacobian_rows)[row * wide + i] = weight;
   }
-  for (std::size_t n = 0; n < neighbours_.size(); ++n) {
-    const auto [i, j] = neighbours_[n];
+  for (const auto& [i, j] : neighbours_) {
     const double weight = options_.smooth / std::sqrt(static_cast<double>(neighbours_.size()));
     // Its square is that of a pseudo-Huber loss: d^2 for small differences, 2 kBorder |d| for large ones.
     const double d = (logs[i] - logs[j]) / kBorder, root = std::sqrt(1 + d * d), value = d * std::sqrt(2 / (root + 1));
-    *out++ = weight * kBorder * value;
-    if (jacobian_rows == nullptr) continue;
-    double* const row = *jacobian_rows + (3 * points * cases_.size() + parameters + n) * parameters;
-    std::fill(row, row + parameters, 0.0);
-    const double slope = weight * (d != 0 ? d / (root * value) : 1);
-    row[i] = slope;
-    row[j] = -slope;
+    residuals[row] = weight * kBorder * value;
+    if (jacobian_rows != nullptr) {
+      const double slope = weight * (d != 0 ? d / (root * value) : 1);
+      (*jacobian_rows)[row * wide + i] = slope;
+      (*jacobian_rows)[row * wide + j] = -slope;
+    }
+    ++row;
   }
   return true;
 }
@@ -219,10 +276,10 @@ void Fit::differentiate(std::size_t n, double* jacobian, std::size_t first_row) 
     });
   }
   std::vector<Vec3> du(points);
+  const auto wide = static_cast<std::size_t>(width());
   for (std::size_t j = 0; j < parameters; ++j) {
     solver_.back_solve(right[j], du);
-    for (std::size_t p = 0; p < points; ++p)
-      for (std::size_t a = 0; a < 3; ++a) jacobian[(first_row + 3 * p + a) * parameters + j] = du[p][a] * scale_[n];
+    goals_[n]->along(du, jacobian + first_row * wide + j, wide);
   }
 }
 

@@ -62,11 +62,14 @@ struct CalibrateParams {
   int samples = 0;
   int iterations = 60;
   bool check_truth = false;
+  bool find_pose = false;
+  int most_points = 5000;
 };
 struct CalibrateStage {
   using Params = CalibrateParams;
   static void describe(Params& p, auto& visit) {
-    visit({"fit", "names of the loads to fit, like 'A,B' (empty: the first); the others show how it carries over"}, p.fit);
+    visit({"fit", "names of the loads to fit, like 'A,B' (empty: the first; measured: all that were); the others show how it carries over"},
+          p.fit);
     visit({"law", "of the truth, by finite elements"}, p.law);
     visit({"order", "of the truth's tetrahedra"}, p.order);
     visit({"grid_x", "points of the map of stiffness along x (1, 1, 1: one material)", "", 1, 20}, p.grid_x);
@@ -80,6 +83,10 @@ struct CalibrateStage {
     visit({"samples", "coarse search before: so many mixtures are tried, the best is a start too", "", 0, 10000}, p.samples);
     visit({"iterations", "of the trust region, at most", "", 1, 1000}, p.iterations);
     visit({"check_truth", "solve finite elements half as large too (eight times as many): how far the truth is off itself"}, p.check_truth);
+    visit(
+        {"find_pose", "measured: each file may lie elsewhere by a small rigid motion, which is found too; else it is in the mesh's frame"},
+        p.find_pose);
+    visit({"most_points", "measured: of a larger cloud so many points are drawn at random", "", 20, 100000}, p.most_points);
   }
   static StageInfo info();
   static std::vector<Data> run(const Params& params, std::span<const Data> inputs, const Context& context);

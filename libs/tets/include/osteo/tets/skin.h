@@ -37,6 +37,8 @@ class Skin {
   [[nodiscard]] std::size_t mesh_point_count() const { return mesh_points_; }
   /// embedded: the corners of the tetrahedron that a point follows.
   [[nodiscard]] const std::array<std::uint32_t, 4>& corners(std::size_t point) const { return embeddings_[point].v; }
+  /// embedded: the share of each corner.
+  [[nodiscard]] const std::array<float, 4>& weights(std::size_t point) const { return embeddings_[point].w; }
   /// Points that lie outside the mesh at rest.
   [[nodiscard]] std::size_t outside() const { return outside_; }
 
