@@ -1,5 +1,7 @@
 // What the tables of 'osteo bench geometry' share: clocks, surfaces, peers from PyPI.
 #pragma once
+#include <sys/resource.h>
+
 #include <chrono>
 #include <cstdio>
 #include <ctime>
@@ -18,10 +20,14 @@ namespace osteo::bench {
 
 namespace fs = std::filesystem;
 
+// Of this process and of those that it ran: TetGen and CGAL have their own.
 inline double cpu_seconds() {
   timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  rusage ended{};
+  getrusage(RUSAGE_CHILDREN, &ended);
+  const auto seconds = [](const timeval& v) { return static_cast<double>(v.tv_sec) + 1e-6 * static_cast<double>(v.tv_usec); };
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec) + seconds(ended.ru_utime) + seconds(ended.ru_stime);
 }
 inline double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
