@@ -1,6 +1,5 @@
 // A shape held against points that were measured on its surface.
 #pragma once
-#include <Eigen/Core>
 #include <array>
 #include <vector>
 

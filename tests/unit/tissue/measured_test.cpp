@@ -8,6 +8,7 @@
 #include "osteo/base/error.h"
 #include "osteo/base/files.h"
 #include "scanned.h"
+#include "surface_goal.h"
 
 namespace osteo {
 namespace {
@@ -128,6 +129,14 @@ TEST(Measured, StiffnessFromHalfOfANoisySurface) {
   EXPECT_LT(r.views[0].seen_share, 0.75);
   EXPECT_GT(r.views[0].before.median_mm, 5 * r.views[0].after.median_mm);
   EXPECT_GT(r.settled[0], 0.9);
+  // A quarter of the points astray.
+  Scan worse = scan;
+  worse.stray_share = 0.25;
+  const MeasuredCase strays{c.load, {scanned("bend", post.fine, truth, worse)}};
+  TissueModel by_fewer = post.model(0.05);
+  const MeasuredCalibration w = calibrate_measured(by_fewer, boundary_surface(by_fewer), std::span(&strays, 1));
+  EXPECT_NEAR(std::log(50 * std::exp(w.all.log) / told), 0, 0.06);
+  EXPECT_GT(w.views[0].rejected, 200U);
   // Of 1500 points 300 are drawn, the same each time, and do as well.
   MeasuredOptions few;
   few.most_points = 300;
@@ -189,6 +198,50 @@ TEST(Measured, FindsWhereTheCloudLies) {
   EXPECT_NEAR(r.views[0].turned_deg[2], -turn * 57.2958, 0.4);
   EXPECT_LT(r.views[0].after.rms_mm, 0.2 * without.views[0].after.rms_mm);
   EXPECT_LT(without.views[0].shifted_mm[0], 1e-12);
+}
+
+// Distances' derivatives, by the shape and by where the cloud lies, against central differences.
+TEST(Measured, DistancesHaveExactDerivatives) {
+  const auto& [post, end, truth] = bent();
+  const TissueModel model = post.model(0.1);
+  const BodySurface surface = boundary_surface(model);
+  // A shape that fits nothing; a cloud that is off it everywhere, and markers.
+  std::vector<Vec3> shape = model.rest(), by;
+  for (Vec3& x : shape) {
+    by.push_back({0.3 * std::sin(x.z), 0.2 * x.x, 0.1 * std::cos(x.y + x.z)});
+    x += Vec3{0.01 * x.z * x.z, 0.02 * x.z, -0.01 * x.x * x.z};
+  }
+  const std::vector<MeasuredPoints> views{scanned("c", post.fine, truth, {200, 0.2, 0, [](Vec3) { return true; }, 2}),
+                                          test::marked("m", post.fine, truth, 9, 0.2, 2)};
+  const Context context;
+  tissue::SurfaceGoal goal(model, surface, views, true, 1000, context);
+  ASSERT_EQ(goal.own(), 12U);
+  std::vector<double> own{0.3, -0.2, 0.4, 0.1, 0.2, -0.3, -0.1, 0.2, 0.1, 0.3, -0.2, 0.2};
+  std::vector<double> r(goal.rows()), up(r.size()), down(r.size()), exact(r.size()), jacobian(r.size() * 12);
+  goal.residuals(shape, own.data(), r.data());
+  goal.widen_by_noise(shape);  // narrow enough to bend the loss
+  const auto off = [&](std::size_t row) { return std::abs((up[row] - down[row]) / 2e-5 - exact[row]); };
+  constexpr double kStep = 1e-5;
+  for (std::size_t k = 0; k <= 12; ++k) {
+    for (const double side : {1.0, -1.0}) {
+      std::vector<Vec3> x = shape;
+      std::vector<double> pose = own;
+      if (k < 12) pose[k] += side * kStep;
+      for (std::size_t p = 0; p < x.size() && k == 12; ++p) x[p] += by[p] * (side * kStep);
+      goal.residuals(x, pose.data(), side > 0 ? up.data() : down.data());
+    }
+    goal.residuals(shape, own.data(), r.data());
+    if (k == 12) {
+      goal.along(by, exact.data(), 1);
+    } else {
+      goal.by_own(jacobian.data(), 12);
+      for (std::size_t row = 0; row < r.size(); ++row) exact[row] = jacobian[row * 12 + k];
+    }
+    // Where the nearest triangle changes there is a kink.
+    std::size_t bad = 0;
+    for (std::size_t row = 0; row < r.size(); ++row) bad += off(row) > 1e-6 ? 1 : 0;
+    EXPECT_LE(bad, 2U) << k;
+  }
 }
 
 // Residuals' derivatives, as the fit takes them, lead it to factors that are there: what the model itself does, seen without noise.
