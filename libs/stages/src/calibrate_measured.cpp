@@ -54,6 +54,11 @@ void refuse_what_has_no_effect(const CalibrateParams& p) {
 // What a user should not have to find out from the figures.
 void warn_of(const MeasuredCalibration& c, std::size_t weak, std::size_t points, const Context& context) {
   if (!c.fit.converged) context.warn("the fit did not come to its end: " + c.fit.why);
+  std::size_t distances = 0;
+  for (const MeasuredView& v : c.views) distances += v.drawn * (v.markers ? 3 : 1);
+  if (distances < 3 * static_cast<std::size_t>(c.fit.parameters))
+    context.warn(std::to_string(distances) + " distances are few for " + std::to_string(c.fit.parameters) +
+                 " parameters: the fit follows the noise, which it then tells too small, and its intervals too narrow; take a coarser map");
   for (const MeasuredView& v : c.views) {
     const double rejected = static_cast<double>(v.rejected) / static_cast<double>(v.drawn);
     if (rejected > 0.2)
