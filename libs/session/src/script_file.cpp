@@ -202,7 +202,7 @@ class ScriptReader {
   // Named, or all that it is.
   const PlannedCut* planned(const JsonValue& j, const std::string& where, const std::string& name, std::string_view beside) {
     const JsonValue* const given = j.find("planned");
-    if (given == nullptr) {
+    if (name.empty()) {
       for (const char* const key : {"at_mm", "normal"}) {
         if (j.find(key) == nullptr)
           throw file_.wrong(j, where + ": \"" + key + "\" is missing", "or name a planned cut of the case: {\"planned\": \"left body\"}");
@@ -371,7 +371,7 @@ std::string script_schema() {
       what["properties"]["pieces"]["minItems"] = 1;
       what["properties"]["pieces"]["maxItems"] = 2;
     }
-    if (what["properties"].contains("planned")) what["oneOf"] = {{{"required", {"planned"}}}, {{"required", {"at_mm", "normal"}}}};
+    if (what["properties"].contains("planned")) what["anyOf"] = {{{"required", {"planned"}}}, {{"required", {"at_mm", "normal"}}}};
     entry["properties"][F::kName] = what;
     entry["required"].push_back(F::kName);
     any.push_back(entry);
