@@ -201,7 +201,6 @@ class ScriptReader {
 
   // Named, or all that it is.
   const PlannedCut* planned(const JsonValue& j, const std::string& where, const std::string& name, std::string_view beside) {
-    const JsonValue* const given = j.find("planned");
     if (name.empty()) {
       for (const char* const key : {"at_mm", "normal"}) {
         if (j.find(key) == nullptr)
@@ -213,7 +212,7 @@ class ScriptReader {
       if (m.key != "planned" && m.key != beside)
         throw file_.wrong(m.value, where + ": \"" + m.key + "\" beside \"planned\": the planned cut says that", "leave out one of the two");
     }
-    return located(*given, where, [&] { return &planned_cut(planned_, name); });
+    return located(*j.find("planned"), where, [&] { return &planned_cut(planned_, name); });
   }
   void act(double t, const Saw& s, const JsonValue& j, const std::string& where) {
     const PlannedCut* const plan = planned(j, where, s.planned, "piece");
