@@ -161,8 +161,10 @@ double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
   if (!solid) return 0;
   // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in voxels, so that only
   // it is as coarse as these, and nothing where nothing overlaps.
-  InsideReport of_solid;
-  const bool same = voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words;
+  // A surface that was sound is not counted again.
+  InsideReport of_solid = report;
+  const bool untouched = solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
+  const bool same = untouched || voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words;
   const TriangleSoup& used = same ? solid->soup : whole;
   return divergence(used) - static_cast<double>(same ? of_solid.surplus : report.surplus) * frame.voxel_volume_mm3();
 }
