@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "osteo/base/param.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo {
 

@@ -2,8 +2,8 @@
 #pragma once
 #include <string>
 
-#include "osteo/stages/mesh.h"
-#include "osteo/tissue/calibrate.h"
+#include "osteo/app/stages/mesh.h"
+#include "osteo/simulation/tissue/calibrate.h"
 
 namespace osteo {
 

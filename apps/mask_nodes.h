@@ -2,8 +2,8 @@
 #pragma once
 #include <algorithm>
 
-#include "osteo/base/error.h"
-#include "osteo/pipeline/pipeline.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 
 namespace osteo {
 

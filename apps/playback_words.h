@@ -3,9 +3,9 @@
 #include <cmath>
 #include <string>
 
-#include "osteo/base/json_document.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/tutor/playback.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/network/tutor/playback.h"
 
 namespace osteo {
 

@@ -3,42 +3,38 @@
 #include <string>
 #include <vector>
 
-#include "osteo/bone/action.h"
-#include "osteo/bone/burr.h"
-#include "osteo/bone/posture.h"
-#include "osteo/camera/stereo.h"
-#include "osteo/haptics/contact.h"
-#include "osteo/marker/device.h"
-#include "osteo/view/quality.h"
+#include "osteo/simulation/bone/action.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/bone/posture.h"
+#include "osteo/simulation/camera/stereo.h"
+#include "osteo/simulation/haptics/contact.h"
+#include "osteo/simulation/marker/device.h"
+#include "osteo/display/view/quality.h"
 
 namespace osteo {
 
 enum class Hand : int { automatic, mouse, spacemouse, woodenhaptics, marker, igtl };
-template <>
-struct EnumNames<Hand> {
-  static constexpr std::array<std::string_view, 6> values{"auto", "mouse", "spacemouse", "woodenhaptics", "marker", "igtl"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 6> enum_names(Hand) {
+  return {"auto", "mouse", "spacemouse", "woodenhaptics", "marker", "igtl"};
+}
 
 /// Of the window at the start.
 enum class StartLayout : int { last, beside, operate, plan };
-template <>
-struct EnumNames<StartLayout> {
-  static constexpr std::array<std::string_view, 4> values{"last", "beside", "operate", "plan"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(StartLayout) {
+  return {"last", "beside", "operate", "plan"};
+}
 
 /// How someone takes part in a session that runs elsewhere.
 enum class Attend : int { trainee, watcher };
-template <>
-struct EnumNames<Attend> {
-  static constexpr std::array<std::string_view, 2> values{"trainee", "watcher"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(Attend) {
+  return {"trainee", "watcher"};
+}
 
 /// What moves the second hand.
 enum class SecondDevice : int { keys, spacemouse, woodenhaptics };
-template <>
-struct EnumNames<SecondDevice> {
-  static constexpr std::array<std::string_view, 3> values{"keys", "spacemouse", "woodenhaptics"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(SecondDevice) {
+  return {"keys", "spacemouse", "woodenhaptics"};
+}
 
 struct WindowFlags {
   using Params = WindowFlags;

@@ -4,7 +4,7 @@ read from the commands that link."""
 import re, subprocess, sys
 
 build = sys.argv[1]
-programs = ["test_bone", "test_haptics", "test_devices", "test_session", "no_alloc"]
+programs = ["test_bone", "test_haptics", "test_devices", "test_recording", "no_alloc"]
 unwanted = re.compile(r"(?:lib|-l)(dcm\w*|ofstd|oflog|gdcm\w*|vtk\w*|archive|osteo_(?:dicom|io|stage|stages|pipeline))\b")
 witness = "osteo"  # links them all: if its commands show none, this test looks for the wrong names
 

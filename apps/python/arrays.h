@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/base/param.h"
-#include "osteo/data/frame.h"
+#include "osteo/core/base/param.h"
+#include "osteo/core/data/frame.h"
 
 namespace osteo::python {
 

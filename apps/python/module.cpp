@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "arrays.h"
-#include "osteo/grid/dense.h"
-#include "osteo/pipeline/formats.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/stages/registry.h"
+#include "osteo/geometry/grid/dense.h"
+#include "osteo/imaging/pipeline/formats.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/app/stages/registry.h"
 
 namespace osteo::python {
 namespace {

@@ -1,5 +1,5 @@
 // A rehearsal that a script of Python steps: goals of hands in, records of ticks out.
-#include "osteo/scene/rehearsal.h"
+#include "osteo/session/scene/rehearsal.h"
 
 #include <atomic>
 #include <cmath>
@@ -8,13 +8,13 @@
 #include <mutex>
 
 #include "arrays.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/bone/world_mesh.h"
-#include "osteo/haptics/stroke_goal.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/haptic_settings.h"
-#include "osteo/session/script_file.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/simulation/bone/world_mesh.h"
+#include "osteo/simulation/haptics/stroke_goal.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/haptic_settings.h"
+#include "osteo/session/recording/script_file.h"
 
 namespace osteo::python {
 namespace {

@@ -3,8 +3,8 @@
 #include <map>
 
 #include "arrays.h"
-#include "osteo/session/records.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/session/recording/records.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::python {
 namespace {

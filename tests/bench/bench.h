@@ -1,6 +1,6 @@
 // The subjects of osteo_bench. Each prints tables in Markdown.
 #pragma once
-#include "osteo/base/context.h"
+#include "osteo/core/base/context.h"
 
 namespace osteo {
 

@@ -19,15 +19,15 @@
 
 #include "ball.h"
 #include "bench.h"
-#include "osteo/bone/dust.h"
-#include "osteo/bone/live_surface.h"
-#include "osteo/bone/pieces.h"
-#include "osteo/bone/saw.h"
-#include "osteo/bone/thickness.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/io/vtk_data.h"
+#include "osteo/simulation/bone/dust.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/simulation/bone/pieces.h"
+#include "osteo/simulation/bone/saw.h"
+#include "osteo/simulation/bone/thickness.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
 
 namespace osteo {
 namespace {

@@ -4,13 +4,13 @@
 
 #include "bench_geometry.h"
 #include "bench_geometry_peers.h"
-#include "osteo/base/simd.h"
-#include "osteo/distance/live_distance.h"
-#include "osteo/distance/mask_distance.h"
-#include "osteo/distance/swept_distance.h"
-#include "osteo/distance/thesis_distance.h"
-#include "osteo/image/distance.h"
-#include "osteo/mesh/bone_surface.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/geometry/distance/live_distance.h"
+#include "osteo/geometry/distance/mask_distance.h"
+#include "osteo/geometry/distance/swept_distance.h"
+#include "osteo/geometry/distance/thesis_distance.h"
+#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::bench {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "cut_picture.h"
 #include "edit_worker.h"
-#include "osteo/base/files.h"
-#include "osteo/base/parallel.h"
-#include "osteo/edit/edit_file.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/imaging/edit/edit_file.h"
 
 namespace {
 

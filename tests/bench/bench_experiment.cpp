@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "osteo/base/simd.h"
-#include "osteo/experiment/participant.h"
-#include "osteo/experiment/recall.h"
-#include "osteo/experiment/trial.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/assessment/experiment/participant.h"
+#include "osteo/assessment/experiment/recall.h"
+#include "osteo/assessment/experiment/trial.h"
 
 using namespace osteo;
 using namespace osteo::experiment;

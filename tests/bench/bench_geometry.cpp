@@ -8,14 +8,14 @@
 
 #include "bench.h"
 #include "bench_geometry_peers.h"
-#include "osteo/cgal/mesh_cgal.h"
-#include "osteo/distance/compare.h"
-#include "osteo/tetgen/mesh_tetgen.h"
-#include "osteo/tets/graded_tets.h"
-#include "osteo/tets/grid_tets.h"
-#include "osteo/tets/quality.h"
-#include "osteo/tets/skin.h"
-#include "osteo/tets/stuffing.h"
+#include "osteo/geometry/cgal/mesh_cgal.h"
+#include "osteo/geometry/distance/compare.h"
+#include "osteo/geometry/tetgen/mesh_tetgen.h"
+#include "osteo/geometry/tets/graded_tets.h"
+#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/quality.h"
+#include "osteo/geometry/tets/skin.h"
+#include "osteo/geometry/tets/stuffing.h"
 
 namespace osteo {
 namespace bench {

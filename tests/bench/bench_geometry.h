@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "meshes.h"
-#include "osteo/base/context.h"
-#include "osteo/base/error.h"
-#include "osteo/base/param.h"
+#include "osteo/core/base/context.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo::bench {
 

@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "osteo/data/frame.h"
-#include "osteo/mesh/curve.h"
-#include "osteo/mesh/soup.h"
+#include "osteo/core/data/frame.h"
+#include "osteo/geometry/mesh/curve.h"
+#include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::bench {
 

@@ -2,9 +2,9 @@
 #include <cstdio>
 
 #include "bench.h"
-#include "osteo/base/error.h"
-#include "osteo/ground_truth/experiments.h"
-#include "osteo/io/surface_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/assessment/ground_truth/experiments.h"
+#include "osteo/imaging/io/surface_io.h"
 
 namespace osteo {
 

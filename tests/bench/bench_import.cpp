@@ -25,11 +25,11 @@
 #include <functional>
 
 #include "bench.h"
-#include "osteo/base/files.h"
-#include "osteo/bone_import/import_bone.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/image/phantom.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/bone_import/import_bone.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/imaging/image/phantom.h"
 
 namespace osteo {
 namespace {

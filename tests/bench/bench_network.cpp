@@ -8,9 +8,9 @@
 #include "bench.h"
 #include "ear.h"
 #include "flood.h"
-#include "osteo/base/error.h"
-#include "osteo/session/script.h"
-#include "osteo/wire/rehearsal_stream.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/recording/script.h"
+#include "osteo/network/wire/rehearsal_stream.h"
 
 namespace osteo {
 namespace {

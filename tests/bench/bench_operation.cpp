@@ -10,12 +10,12 @@
 #include <thread>
 
 #include "bench.h"
-#include "osteo/bone/plate_fit.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/rt/loop.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/core/rt/loop.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo {
 namespace {

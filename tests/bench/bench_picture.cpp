@@ -25,14 +25,14 @@
 #include <thread>
 #include <vector>
 
-#include "osteo/bone/world.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/io/vtk_data.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/offscreen.h"
-#include "osteo/view/world_view.h"
+#include "osteo/simulation/bone/world.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/world_view.h"
 
 using namespace osteo;
 

@@ -8,12 +8,12 @@
 #include <fstream>
 
 #include "bench.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/dicom/import.h"
-#include "osteo/image/phantom.h"
-#include "osteo/io/volume_io.h"
-#include "osteo/registration/register.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/registration/register.h"
 #include "second_scan.h"
 
 namespace osteo {

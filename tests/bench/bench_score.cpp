@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <iostream>
 
-#include "osteo/evidence/product.h"
-#include "osteo/evidence/score.h"
-#include "osteo/scene/hint_reader.h"
-#include "osteo/scene/session_folder.h"
+#include "osteo/assessment/evidence/product.h"
+#include "osteo/assessment/evidence/score.h"
+#include "osteo/session/scene/hint_reader.h"
+#include "osteo/session/scene/session_folder.h"
 
 using namespace osteo;
 

@@ -9,10 +9,10 @@
 #include <cstring>
 #include <string>
 
-#include "osteo/base/error.h"
-#include "osteo/image/phantom.h"
-#include "osteo/segment/ear.h"
-#include "osteo/segment/tube.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/segment/ear.h"
+#include "osteo/imaging/segment/tube.h"
 #include "segment/ear_truth.h"
 #include "segment/tube_ct.h"
 

@@ -6,13 +6,13 @@
 #include <random>
 
 #include "bench.h"
-#include "osteo/base/error.h"
-#include "osteo/grid/brick_grid.h"
-#include "osteo/grid/resample.h"
-#include "osteo/grid/sampler.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/mesh/bone_surface.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/grid/sampler.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "block.h"
-#include "osteo/tissue/calibrate.h"
-#include "osteo/tissue/fem.h"
+#include "osteo/simulation/tissue/calibrate.h"
+#include "osteo/simulation/tissue/fem.h"
 
 namespace osteo::bench {
 

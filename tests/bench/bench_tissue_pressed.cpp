@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "bench_tissue.h"
-#include "osteo/tissue/dynamics.h"
+#include "osteo/simulation/tissue/dynamics.h"
 
 namespace osteo::bench {
 namespace {

@@ -6,10 +6,10 @@
 
 #include "bench_tissue.h"
 #include "mapped.h"
-#include "osteo/base/simd.h"
-#include "osteo/tets/skin.h"
-#include "osteo/tissue/dynamics.h"
-#include "osteo/tissue/implicit.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/geometry/tets/skin.h"
+#include "osteo/simulation/tissue/dynamics.h"
+#include "osteo/simulation/tissue/implicit.h"
 
 namespace osteo::bench {
 namespace {

@@ -10,12 +10,12 @@
 #include <iostream>
 #include <mutex>
 
-#include "osteo/base/files.h"
-#include "osteo/base/parallel.h"
-#include "osteo/evidence/score.h"
-#include "osteo/statistics/basics.h"
-#include "osteo/trainee/group.h"
-#include "osteo/trainee/simulate.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/assessment/evidence/score.h"
+#include "osteo/core/statistics/basics.h"
+#include "osteo/assessment/trainee/group.h"
+#include "osteo/assessment/trainee/simulate.h"
 
 using namespace osteo;
 

@@ -9,10 +9,10 @@
 
 #include "bench.h"
 #include "flood.h"
-#include "osteo/base/files.h"
-#include "osteo/session/script.h"
-#include "osteo/tutor/live_run.h"
-#include "osteo/tutor/playback.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/recording/script.h"
+#include "osteo/network/tutor/live_run.h"
+#include "osteo/network/tutor/playback.h"
 #include "tutor/live_pair.h"
 
 namespace osteo {

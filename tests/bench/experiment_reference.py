@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reference values for repeated measures and paired comparisons (libs/statistics/within.h), by SciPy, statsmodels and pingouin; what none of
+"""Reference values for repeated measures and paired comparisons (libs/core/statistics/within.h), by SciPy, statsmodels and pingouin; what none of
 them has, by its definition written out in NumPy. Writes testdata/statistics/within.json.
 
 python3 -m venv build/peers-statistics && build/peers-statistics/bin/pip install scipy statsmodels pingouin

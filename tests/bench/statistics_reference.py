@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reference values for libs/statistics, by SciPy, statsmodels, pingouin, scikit-learn, irrCAC, mpmath; what none of them has, by its
+"""Reference values for libs/core/statistics, by SciPy, statsmodels, pingouin, scikit-learn, irrCAC, mpmath; what none of them has, by its
 definition written out in NumPy. Writes testdata/statistics/*.json.
 
 python3 -m venv build/peers-statistics && build/peers-statistics/bin/pip install scipy==1.17.1 statsmodels==0.15.0 pingouin==0.7.0 scikit-learn==1.9.1 irrCAC==0.4.4 mpmath && build/peers-statistics/bin/pip install scipy==1.17.1 (irrCAC asks for an older one, and works with this)

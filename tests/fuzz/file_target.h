@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 template <class Read>
 int fuzz_file(const std::uint8_t* data, std::size_t size, const char* suffix, Read&& read) {

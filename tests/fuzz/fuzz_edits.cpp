@@ -3,8 +3,8 @@
 #include <string_view>
 
 #include "edit_subject.h"
-#include "osteo/base/error.h"
-#include "osteo/edit/edit_file.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/edit/edit_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace osteo;

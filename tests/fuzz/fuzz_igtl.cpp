@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "osteo/wire/igtl.h"
-#include "osteo/wire/stream_feed.h"
+#include "osteo/network/wire/igtl.h"
+#include "osteo/network/wire/stream_feed.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;

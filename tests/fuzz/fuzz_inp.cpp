@@ -1,9 +1,9 @@
 // Input files of Abaqus and CalculiX: mesh, and the problem in it.
 #include <string_view>
 
-#include "osteo/base/error.h"
-#include "osteo/io/inp_io.h"
-#include "osteo/tissue/problem.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/io/inp_io.h"
+#include "osteo/simulation/tissue/problem.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

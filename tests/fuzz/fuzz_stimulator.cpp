@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "osteo/wire/stimulator_link.h"
+#include "osteo/network/wire/stimulator_link.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace osteo;

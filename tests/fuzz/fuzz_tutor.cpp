@@ -5,7 +5,7 @@
 #include <memory>
 #include <span>
 
-#include "osteo/tutor/live.h"
+#include "osteo/network/tutor/live.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace osteo;

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "osteo/base/error.h"
-#include "osteo/dicom/verdict.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/verdict.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {

@@ -11,12 +11,12 @@
 #include <fstream>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/dicom/import.h"
-#include "osteo/dicom/objects.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/image/phantom.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/imaging/image/phantom.h"
 #include "pixels.h"
 
 namespace osteo {

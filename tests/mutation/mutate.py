@@ -13,12 +13,12 @@ import argparse, concurrent.futures, os, pathlib, random, re, resource, shutil, 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Library: its sources, and the tests that answer for it. The headers of rt hold most of its code.
 LIBRARIES = {
-    "rt": (["libs/rt/src/*.cpp", "libs/rt/include/osteo/rt/*.h"], ["test_rt"]),
-    "haptics": (["libs/haptics/src/*.cpp"], ["test_haptics", "test_scene"]),
-    "bone": (["libs/bone/src/*.cpp"], ["test_bone", "test_haptics", "test_scene"]),
-    "session": (["libs/session/src/*.cpp"], ["test_session", "test_scene"]),
-    "scene": (["libs/scene/src/*.cpp"], ["test_scene"]),
-    "dicom": (["libs/dicom/src/plac*.cpp"], ["test_dicom"]),
+    "rt": (["libs/core/rt/src/*.cpp", "libs/core/rt/include/osteo/core/rt/*.h"], ["test_rt"]),
+    "haptics": (["libs/simulation/haptics/src/*.cpp"], ["test_haptics", "test_scene"]),
+    "bone": (["libs/simulation/bone/src/*.cpp"], ["test_bone", "test_haptics", "test_scene"]),
+    "session": (["libs/session/recording/src/*.cpp"], ["test_recording", "test_scene"]),
+    "scene": (["libs/session/scene/src/*.cpp"], ["test_scene"]),
+    "dicom": (["libs/imaging/dicom/src/plac*.cpp"], ["test_dicom"]),
 }
 # Texts only for people, and loops for one kind of processor.
 SKIPPED = re.compile(r"/(overlap_avx\w*|default_script)\.cpp$")

@@ -1,5 +1,5 @@
 """`osteo deidentify` read by pydicom: every attribute of the table, by its tag, with a canary in it.
-usage: check_deid.py BIN WORK TABLE, TABLE being libs/pacs/src/deidentify_table.h"""
+usage: check_deid.py BIN WORK TABLE, TABLE being libs/hospital/pacs/src/deidentify_table.h"""
 import json, os, pathlib, re, shutil, subprocess, sys, warnings
 
 try:

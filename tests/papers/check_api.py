@@ -45,7 +45,7 @@ with tempfile.TemporaryDirectory() as scratch:
     for lib in (copy / "libs").iterdir():  # one library is enough
         if lib.is_dir() and lib.name not in ("heat", "cmake"):
             shutil.rmtree(lib)
-    header = next((copy / "libs/heat/include").rglob("*.h"))
+    header = next((copy / "libs/simulation/heat/include").rglob("*.h"))
     header.write_text(header.read_text() + "\nclass Lost {};\n/// @ref nowhere_at_all\nvoid lost();\n")
     wrong = subprocess.run([sys.executable, copy / "apps/packaging/api.py", copy / "out"], capture_output=True, text=True)
     assert wrong.returncode not in (0, 77) and "nowhere_at_all" in wrong.stderr, wrong

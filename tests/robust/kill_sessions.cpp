@@ -13,9 +13,9 @@
 #include <random>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/session/recorder.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/recording/recorder.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace {
 

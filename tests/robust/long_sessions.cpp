@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <random>
 
-#include "osteo/scene/session_folder.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace {
 

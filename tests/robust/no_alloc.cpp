@@ -6,7 +6,7 @@
 #include <cmath>
 #include <mutex>
 
-#include "osteo/haptics/servo.h"
+#include "osteo/simulation/haptics/servo.h"
 #include "slab.h"
 
 namespace {

@@ -3,16 +3,16 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/base/files.h"
-#include "osteo/base/simd.h"
-#include "osteo/bone/plates.h"
-#include "osteo/distance/distance_map.h"
-#include "osteo/haptics/fields.h"
-#include "osteo/haptics/servo.h"
-#include "osteo/haptics/vibration.h"
-#include "osteo/mesh/bone_surface.h"
-#include "osteo/mesh/soup.h"
-#include "osteo/tissue/dynamics.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/geometry/distance/distance_map.h"
+#include "osteo/simulation/haptics/fields.h"
+#include "osteo/simulation/haptics/servo.h"
+#include "osteo/simulation/haptics/vibration.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/geometry/mesh/soup.h"
+#include "osteo/simulation/tissue/dynamics.h"
 #include "slab.h"
 #include "tissue/block.h"
 

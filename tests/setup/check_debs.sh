@@ -86,7 +86,7 @@ if [ -n "$(deb osteo-full)" ]; then
   as_user "cmp case/surface.ply case-full/surface.ply"
 fi
 install $(deb libosteo-dev)
-[ -s "$work/root/usr/include/osteo/data/tri_mesh.h" ] && ls "$work"/root/usr/lib/*/osteo/libosteo_base.a >/dev/null || { echo "libosteo-dev holds no library"; exit 1; }
+[ -s "$work/root/usr/include/osteo/core/data/tri_mesh.h" ] && ls "$work"/root/usr/lib/*/osteo/libosteo_base.a >/dev/null || { echo "libosteo-dev holds no library"; exit 1; }
 if [ -n "${OSTEO_DEBS_OUTSIDE:-}" ]; then
   install g++ cmake make
   cp -r "$root/tests/setup/outside" "$work/root/outside"

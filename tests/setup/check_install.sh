@@ -9,7 +9,7 @@ p=$work/prefix
 for f in bin/osteo share/osteo/pipelines/temporal-bone.json share/man/man1/osteo.1 share/man/man1/osteo-prepare.1 share/bash-completion/completions/osteo \
   share/zsh/site-functions/_osteo share/fish/vendor_completions.d/osteo.fish share/osteo/slicer/OsteoThreshold share/osteo/slicer/OsteoThreshold.xml \
   share/icons/hicolor/scalable/apps/osteo.svg share/mime/packages/osteo.xml lib/udev/rules.d/70-osteotome.rules lib/systemd/system/osteo-receive.service \
-  lib/systemd/system/osteo-watch.service lib/systemd/system/osteo-watch-orthanc@.service share/osteo/pipelines/rules.json include/osteo/data/tri_mesh.h; do
+  lib/systemd/system/osteo-watch.service lib/systemd/system/osteo-watch-orthanc@.service share/osteo/pipelines/rules.json include/osteo/core/data/tri_mesh.h; do
   [ -s "$p/$f" ] || { echo "not installed: $f"; exit 1; }
 done
 "$p/bin/osteo" --version >/dev/null

@@ -2,7 +2,7 @@
 #pragma once
 #include <cmath>
 
-#include "osteo/data/volume.h"
+#include "osteo/core/data/volume.h"
 
 namespace osteo::test {
 

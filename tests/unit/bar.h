@@ -2,7 +2,7 @@
 #pragma once
 #include <cmath>
 
-#include "osteo/bone/rigid_transform.h"
+#include "osteo/simulation/bone/rigid_transform.h"
 #include "soft_solid.h"
 
 namespace osteo::test {

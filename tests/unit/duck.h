@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "osteo/mesh/soup.h"
+#include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::test {
 

@@ -3,9 +3,9 @@
 #include <memory>
 #include <vector>
 
-#include "osteo/data/volume.h"
-#include "osteo/grid/brick_grid.h"
-#include "osteo/image/head_anatomy.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/imaging/image/head_anatomy.h"
 
 namespace osteo::test {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/edit/document.h"
+#include "osteo/imaging/edit/document.h"
 
 namespace osteo::test {
 

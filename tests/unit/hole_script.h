@@ -1,6 +1,6 @@
 // A hand that drills holes.
 #pragma once
-#include "osteo/session/script.h"
+#include "osteo/session/recording/script.h"
 
 namespace osteo::test {
 

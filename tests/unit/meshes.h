@@ -6,8 +6,8 @@
 #include <numbers>
 #include <string>
 
-#include "osteo/io/surface_io.h"
-#include "osteo/mesh/soup.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/geometry/mesh/soup.h"
 
 namespace osteo::test {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "frame.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/session/recording/session_reader.h"
 #include "record_codec.h"
 #include "session_header.h"
 

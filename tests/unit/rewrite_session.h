@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "osteo/session/session_reader.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo::test {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/bone/rigid_transform.h"
-#include "osteo/data/volume.h"
-#include "osteo/image/head_anatomy.h"
+#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/imaging/image/head_anatomy.h"
 
 namespace osteo::test {
 

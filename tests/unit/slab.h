@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "osteo/grid/brick_grid.h"
+#include "osteo/geometry/grid/brick_grid.h"
 
 namespace osteo::test {
 

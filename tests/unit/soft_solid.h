@@ -2,7 +2,7 @@
 #pragma once
 #include <algorithm>
 
-#include "osteo/grid/brick_grid.h"
+#include "osteo/geometry/grid/brick_grid.h"
 
 namespace osteo::test {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <vector>
 
-#include "osteo/grid/brick_grid.h"
-#include "osteo/haptics/device.h"
-#include "osteo/haptics/renderer.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/simulation/haptics/device.h"
+#include "osteo/simulation/haptics/renderer.h"
 #include "slab.h"
 
 namespace osteo::test {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "osteo/haptics/guard.h"
-#include "osteo/haptics/simulated_device.h"
+#include "osteo/simulation/haptics/guard.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 
 namespace osteo::test {
 

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <span>
 
-#include "osteo/session/session_file.h"
+#include "osteo/session/recording/session_file.h"
 
 namespace osteo::test {
 

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
-#include "osteo/haptics/device.h"
-#include "osteo/haptics/renderer.h"
+#include "osteo/simulation/haptics/device.h"
+#include "osteo/simulation/haptics/renderer.h"
 
 namespace osteo::test {
 

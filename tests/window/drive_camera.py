@@ -174,7 +174,7 @@ def camera():
     # Each key of the camera was pressed.
     named = {"kBackspace": "BackSpace", "kKeypad4": "KP_Left", "kKeypad6": "KP_Right", "kKeypad8": "KP_Up", "kKeypad2": "KP_Down",
              "'['": "bracketleft", "']'": "bracketright", "','": "comma", "'.'": "period", "'/'": "slash", "';'": "semicolon"}
-    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/window/src/keys.cpp").read_text(), re.M)
+    table = re.findall(r"^    \{('.'|k\w+), Command::(\w+)", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
     wanted = {named.get(k, k[1].lower() if k[0] == "'" else k[1:]) for k, command in table if command in CAMERA}
     assert wanted == pressed - {"f"}, (wanted - pressed, pressed - wanted)
 

@@ -134,7 +134,7 @@ def hand():
     # Each key of the hand was pressed.
     named = {"'\\''": "apostrophe", "'\\\\'": "backslash", "'`'": "grave", "'-'": "minus", "'='": "equal", "kKeypad0": "KP_Insert", "kKeypadPoint": "KP_Delete",
              "kKeypad5": "KP_Begin", "kKeypad7": "KP_Home", "kKeypad9": "KP_Prior", "kPageUp": "Prior", "kPageDown": "Next"}
-    rows = re.findall(r"^    \{('\\?.'|k\w+), Command::(\w+)(.*)\}", (source / "libs/window/src/keys.cpp").read_text(), re.M)
+    rows = re.findall(r"^    \{('\\?.'|k\w+), Command::(\w+)(.*)\}", (source / "libs/app/window/src/keys.cpp").read_text(), re.M)
     wanted = {("alt+" if "kWithAlt" in rest else "") + named.get(k, k[1].lower() if k[0] == "'" else k[1:]) for k, command, rest in rows if command in HAND}
     assert len(wanted) > 15 and wanted == pressed, (wanted - pressed, pressed - wanted)
 

@@ -3,10 +3,10 @@
 #include <mutex>
 
 #include "console_flags.h"
-#include "osteo/base/error.h"
-#include "osteo/cli/command.h"
-#include "osteo/window/console_window.h"
-#include "osteo/wire/remote_monitor.h"
+#include "osteo/core/base/error.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/app/window/console_window.h"
+#include "osteo/network/wire/remote_monitor.h"
 
 namespace osteo {
 namespace {

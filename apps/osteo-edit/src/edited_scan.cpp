@@ -3,13 +3,13 @@
 #include <map>
 
 #include "mask_nodes.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/image/structures.h"
-#include "osteo/pipeline/formats.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/hand_over.h"
-#include "osteo/scene/recipe.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/image/structures.h"
+#include "osteo/imaging/pipeline/formats.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/hand_over.h"
+#include "osteo/session/scene/recipe.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {

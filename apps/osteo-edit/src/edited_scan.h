@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "osteo/base/context.h"
-#include "osteo/edit/edit_file.h"
-#include "osteo/stage/stage.h"
+#include "osteo/core/base/context.h"
+#include "osteo/imaging/edit/edit_file.h"
+#include "osteo/core/stage/stage.h"
 
 namespace osteo {
 

@@ -11,11 +11,11 @@
 #include "edit_flags.h"
 #include "edited_scan.h"
 #include "licence.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/cli/command.h"
-#include "osteo/stages/registry.h"
-#include "osteo/window/edit_window.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/app/stages/registry.h"
+#include "osteo/app/window/edit_window.h"
 
 extern char** environ;
 

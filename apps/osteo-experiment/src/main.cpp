@@ -1,20 +1,19 @@
 // osteo-experiment: the window of force-skill training. 'osteo experiment force-skill' opens it.
 #include <iostream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/param.h"
-#include "osteo/cli/command.h"
-#include "osteo/devices/devices.h"
-#include "osteo/rt/loop.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/param.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/core/rt/loop.h"
 #include "run_screen.h"
 
 namespace osteo {
 
 enum class ExperimentDevice : int { mouse, keys, woodenhaptics, spacemouse };
-template <>
-struct EnumNames<ExperimentDevice> {
-  static constexpr std::array<std::string_view, 4> values{"mouse", "keys", "woodenhaptics", "spacemouse"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(ExperimentDevice) {
+  return {"mouse", "keys", "woodenhaptics", "spacemouse"};
+}
 
 namespace {
 

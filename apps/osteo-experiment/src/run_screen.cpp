@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "osteo/base/json_document.h"
-#include "osteo/window/window_shell.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/app/window/window_shell.h"
 
 namespace osteo {
 namespace {

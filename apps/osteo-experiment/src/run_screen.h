@@ -2,8 +2,8 @@
 #pragma once
 #include <filesystem>
 
-#include "osteo/base/context.h"
-#include "osteo/experiment/desk.h"
+#include "osteo/core/base/context.h"
+#include "osteo/assessment/experiment/desk.h"
 
 namespace osteo {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "osteo/bone/burr.h"
+#include "osteo/simulation/bone/burr.h"
 
 namespace osteo {
 namespace {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "osteo/devices/devices.h"
-#include "osteo/marker/device.h"
-#include "osteo/window/rehearsal_window.h"
-#include "osteo/wire/tracked_hand.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/simulation/marker/device.h"
+#include "osteo/app/window/rehearsal_window.h"
+#include "osteo/network/wire/tracked_hand.h"
 #include "window_flags.h"
 
 namespace osteo {

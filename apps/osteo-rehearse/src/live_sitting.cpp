@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

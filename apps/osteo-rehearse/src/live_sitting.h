@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "osteo/tutor/live_past.h"
-#include "osteo/tutor/live_seat.h"
-#include "osteo/window/tutor_now.h"
+#include "osteo/network/tutor/live_past.h"
+#include "osteo/network/tutor/live_seat.h"
+#include "osteo/app/window/tutor_now.h"
 #include "window_flags.h"
 
 namespace osteo {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/session/session_reader.h"
-#include "osteo/session/simulated.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/session/recording/session_reader.h"
+#include "osteo/session/recording/simulated.h"
 
 namespace osteo {
 

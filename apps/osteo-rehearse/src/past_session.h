@@ -1,7 +1,7 @@
 // A session that is over, to be looked at again: nothing is written into it.
 #pragma once
-#include "osteo/scene/session_folder.h"
-#include "osteo/window/rehearsal_window.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/app/window/rehearsal_window.h"
 
 namespace osteo {
 

@@ -1,7 +1,7 @@
 #include "session_review.h"
 
-#include "osteo/evidence/findings.h"
-#include "osteo/evidence/timeline.h"
+#include "osteo/assessment/evidence/findings.h"
+#include "osteo/assessment/evidence/timeline.h"
 
 namespace osteo {
 namespace {

@@ -1,8 +1,8 @@
 // What the window shows of a session that is over, from its score.
 #pragma once
-#include "osteo/evidence/procedure.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/window/session_review.h"
+#include "osteo/assessment/evidence/procedure.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/app/window/session_review.h"
 
 namespace osteo {
 

@@ -8,12 +8,12 @@
 #include <iostream>
 #include <utility>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/bone/plates.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/scene/free_ways.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/scene/free_ways.h"
+#include "osteo/session/recording/session_reader.h"
 #include "playback_words.h"
 
 namespace osteo {

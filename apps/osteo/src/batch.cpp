@@ -1,5 +1,5 @@
 // batch: a table of scans becomes cases, each in a process of its own.
-#include "osteo/batch/batch.h"
+#include "osteo/hospital/batch/batch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +11,11 @@
 
 #include "batch_command.h"
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/param.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/pipeline/pipeline.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "commands.h"
-#include "osteo/base/files.h"
-#include "osteo/cli/command.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/cli/command.h"
 
 namespace osteo {
 

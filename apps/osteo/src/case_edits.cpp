@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "mask_nodes.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/case.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/case.h"
 
 namespace osteo {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "osteo/edit/edit_file.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/scene/recipe.h"
+#include "osteo/imaging/edit/edit_file.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/scene/recipe.h"
 
 namespace osteo {
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "case_edits.h"
-#include "osteo/case_report/case_report.h"
-#include "osteo/cli/command.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/scene/recipe.h"
+#include "osteo/assessment/case_report/case_report.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/scene/recipe.h"
 
 namespace osteo {
 

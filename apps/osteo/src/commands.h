@@ -4,18 +4,18 @@
 
 #include "console_flags.h"
 #include "edit_flags.h"
-#include "osteo/bone/burr.h"
-#include "osteo/cli/command.h"
-#include "osteo/haptics/contact.h"
-#include "osteo/image/bone_threshold.h"
-#include "osteo/image/crop.h"
-#include "osteo/marker/body.h"
-#include "osteo/marker/sheet.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/simulation/haptics/contact.h"
+#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/image/crop.h"
+#include "osteo/simulation/marker/body.h"
+#include "osteo/simulation/marker/sheet.h"
 #ifdef OSTEO_WITH_MOVIE
-#include "osteo/movie/movie_options.h"
+#include "osteo/assessment/movie/movie_options.h"
 #endif
-#include "osteo/segment/ear.h"
-#include "osteo/tutor/playback_params.h"
+#include "osteo/imaging/segment/ear.h"
+#include "osteo/network/tutor/playback_params.h"
 #include "window_flags.h"
 
 namespace osteo {
@@ -272,10 +272,9 @@ struct BenchCommand {
 };
 
 enum class RunEngine : int { stages, vtk };
-template <>
-struct EnumNames<RunEngine> {
-  static constexpr std::array<std::string_view, 2> values{"stages", "vtk"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(RunEngine) {
+  return {"stages", "vtk"};
+}
 
 struct RunCommand {
   struct Params {

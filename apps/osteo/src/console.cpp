@@ -5,9 +5,9 @@
 #include <cstring>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/wire/server.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/network/wire/server.h"
 
 namespace osteo {
 

@@ -6,12 +6,12 @@
 
 #include "bench_subjects.h"
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/dicom/objects.h"
-#include "osteo/pipeline/formats.h"
-#include "osteo/pipeline/pipeline.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/pipeline/formats.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 
 namespace osteo {
 

@@ -1,10 +1,10 @@
 // deidentify: objects without what identifies a person.
-#include "osteo/pacs/deidentify.h"
+#include "osteo/hospital/pacs/deidentify.h"
 
 #include <map>
 #include <ostream>
 
-#include "osteo/base/json_document.h"
+#include "osteo/core/base/json_document.h"
 #include "pacs_commands.h"
 
 namespace osteo {

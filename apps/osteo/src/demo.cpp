@@ -5,11 +5,11 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/image/phantom.h"
-#include "osteo/scene/case.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/session/scene/case.h"
 
 namespace osteo {
 

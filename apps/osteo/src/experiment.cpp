@@ -5,10 +5,10 @@
 
 #include "commands.h"
 #include "experiment_force.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/camera/camera_trial.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/simulation/camera/camera_trial.h"
 
 namespace osteo {
 

@@ -9,13 +9,13 @@
 
 #include "commands.h"
 #include "experiment_force.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/base/parallel.h"
-#include "osteo/experiment/analysis.h"
-#include "osteo/report/sheet.h"
-#include "osteo/statistics/basics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/assessment/experiment/analysis.h"
+#include "osteo/core/report/sheet.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo {
 namespace {

@@ -2,12 +2,12 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/cli/report.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/export.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/export.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo {
 

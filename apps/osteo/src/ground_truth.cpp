@@ -4,11 +4,11 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/ground_truth/experiments.h"
-#include "osteo/io/surface_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/assessment/ground_truth/experiments.h"
+#include "osteo/imaging/io/surface_io.h"
 
 namespace osteo {
 

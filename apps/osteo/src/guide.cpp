@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/base/param.h"
-#include "osteo/dicom/import.h"
-#include "osteo/image/bone_threshold.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/image/bone_threshold.h"
 
 namespace osteo {
 

@@ -3,13 +3,13 @@
 #include <filesystem>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json.h"
-#include "osteo/review/heat_sheet.h"
-#include "osteo/scene/heat_reader.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json.h"
+#include "osteo/assessment/review/heat_sheet.h"
+#include "osteo/session/scene/heat_reader.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo {
 

@@ -12,13 +12,13 @@
 #include <thread>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/base/simd.h"
-#include "osteo/devices/devices.h"
-#include "osteo/rt/loop.h"
-#include "osteo/view/offscreen.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/core/rt/loop.h"
+#include "osteo/display/view/offscreen.h"
 #include "pacs_commands.h"
 #include "server_doctor.h"
 

@@ -4,13 +4,13 @@
 #include <vector>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/marker/device.h"
-#include "osteo/marker/sheet.h"
-#include "osteo/rt/loop.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/simulation/marker/device.h"
+#include "osteo/simulation/marker/sheet.h"
+#include "osteo/core/rt/loop.h"
 
 namespace osteo {
 namespace {

@@ -4,13 +4,13 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/nerve/blackrock.h"
-#include "osteo/scene/monitor_reader.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/sound/wav.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/simulation/nerve/blackrock.h"
+#include "osteo/session/scene/monitor_reader.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/simulation/sound/wav.h"
 
 namespace osteo {
 

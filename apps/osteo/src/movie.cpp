@@ -1,6 +1,6 @@
 // osteo movie: a session as a movie, for its surgeon or, blinded, for raters. Only where OSTEO_MOVIE is on.
 #ifdef OSTEO_WITH_MOVIE
-#include "osteo/movie/movie.h"
+#include "osteo/assessment/movie/movie.h"
 
 #include <cmath>
 #include <cstdio>
@@ -8,11 +8,11 @@
 #include <random>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/movie/movie_file.h"
-#include "osteo/scene/session_folder.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/assessment/movie/movie_file.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 

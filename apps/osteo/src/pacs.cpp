@@ -5,11 +5,11 @@
 #include <optional>
 #include <ostream>
 
-#include "osteo/base/json_document.h"
-#include "osteo/pacs/dicomweb.h"
-#include "osteo/pacs/fetch.h"
-#include "osteo/pacs/receive.h"
-#include "osteo/pacs/send.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/dicomweb.h"
+#include "osteo/hospital/pacs/fetch.h"
+#include "osteo/hospital/pacs/receive.h"
+#include "osteo/hospital/pacs/send.h"
 #include "pacs_commands.h"
 
 namespace osteo {

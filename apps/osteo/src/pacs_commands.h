@@ -4,10 +4,10 @@
 #include <map>
 #include <string>
 
-#include "osteo/cli/command.h"
-#include "osteo/pacs/deidentify.h"
-#include "osteo/pacs/peer.h"
-#include "osteo/pacs/rules.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/hospital/pacs/deidentify.h"
+#include "osteo/hospital/pacs/peer.h"
+#include "osteo/hospital/pacs/rules.h"
 
 namespace osteo {
 

@@ -7,14 +7,14 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/tutor/playback.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/network/tutor/playback.h"
 #include "playback_words.h"
 
 namespace osteo {

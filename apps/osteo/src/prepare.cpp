@@ -6,12 +6,12 @@
 #include "case_edits.h"
 #include "case_pipeline.h"
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/cli/report.h"
-#include "osteo/dicom/verdict.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/hand_over.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/imaging/dicom/verdict.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/hand_over.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {

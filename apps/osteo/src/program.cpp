@@ -1,10 +1,10 @@
 #include "batch_command.h"
 #include "commands.h"
 #include "licence.h"
-#include "osteo/stages/registry.h"
+#include "osteo/app/stages/registry.h"
 #include "pacs_commands.h"
 #ifdef OSTEO_WITH_MOVIE
-#include "osteo/movie/movie_file.h"
+#include "osteo/assessment/movie/movie_file.h"
 #endif
 
 namespace osteo {

@@ -3,13 +3,13 @@
 
 #include "case_pipeline.h"
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/dicom/objects.h"
-#include "osteo/scene/approval.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/hand_over.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/session/scene/approval.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/hand_over.h"
 #include "temporal_bone_pipeline.h"
 
 namespace osteo {

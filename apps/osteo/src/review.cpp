@@ -1,11 +1,11 @@
 // review: a session as a page that a person reads.
-#include "osteo/review/review.h"
+#include "osteo/assessment/review/review.h"
 
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 
 namespace osteo {
 

@@ -2,14 +2,14 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/cli/report.h"
-#include "osteo/pipeline/engine.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/session/script_file.h"
-#include "osteo/vtk/pipeline.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/imaging/pipeline/engine.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/session/recording/script_file.h"
+#include "osteo/app/vtk/pipeline.h"
 
 namespace osteo {
 

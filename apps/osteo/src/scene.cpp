@@ -3,18 +3,18 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/bone/live_components.h"
-#include "osteo/bone/world_mesh.h"
-#include "osteo/cli/report.h"
-#include "osteo/grid/grid_io.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/haptic_settings.h"
-#include "osteo/session/script_file.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/simulation/bone/live_components.h"
+#include "osteo/simulation/bone/world_mesh.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/geometry/grid/grid_io.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/haptic_settings.h"
+#include "osteo/session/recording/script_file.h"
 
 namespace osteo {
 

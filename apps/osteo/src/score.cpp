@@ -1,15 +1,15 @@
 // score: a session as figures, each with what it comes from.
-#include "osteo/evidence/score.h"
+#include "osteo/assessment/evidence/score.h"
 
 #include <cmath>
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/heat_score.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/simulated.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/heat_score.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/simulated.h"
 
 namespace osteo {
 

@@ -4,9 +4,9 @@
 #include <iomanip>
 #include <ostream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/json_document.h"
-#include "osteo/pacs/server.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/server.h"
 
 namespace osteo {
 namespace {

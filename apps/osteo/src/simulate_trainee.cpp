@@ -3,11 +3,11 @@
 #include <ostream>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/evidence/procedure.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/trainee/simulate.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/evidence/procedure.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/assessment/trainee/simulate.h"
 
 namespace osteo {
 

@@ -4,15 +4,15 @@
 #include <set>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/cli/report.h"
-#include "osteo/scene/case.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/scene/sound.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/session/scene/case.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/scene/sound.h"
+#include "osteo/session/recording/session_reader.h"
 
 namespace osteo {
 

@@ -3,13 +3,13 @@
 #include <thread>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/rt/loop.h"
-#include "osteo/scene/monitor_reader.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/wire/rehearsal_stream.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/rt/loop.h"
+#include "osteo/session/scene/monitor_reader.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/network/wire/rehearsal_stream.h"
 
 namespace osteo {
 

@@ -4,13 +4,13 @@
 #include <set>
 
 #include "commands.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/base/param.h"
-#include "osteo/report/sheet.h"
-#include "osteo/study/analysis.h"
-#include "osteo/study/study.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/base/param.h"
+#include "osteo/core/report/sheet.h"
+#include "osteo/assessment/study/analysis.h"
+#include "osteo/assessment/study/study.h"
 #include "study_demo.h"
 
 namespace osteo {

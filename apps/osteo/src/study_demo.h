@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "osteo/cli/command.h"
+#include "osteo/app/cli/command.h"
 
 namespace osteo {
 

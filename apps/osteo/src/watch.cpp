@@ -1,5 +1,5 @@
 // watch: scans that come into a folder become cases, by rules.
-#include "osteo/pacs/watch.h"
+#include "osteo/hospital/pacs/watch.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -7,9 +7,9 @@
 #include <ostream>
 
 #include "batch_command.h"
-#include "osteo/base/json_document.h"
-#include "osteo/pacs/orthanc.h"
-#include "osteo/pipeline/pipeline.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/hospital/pacs/orthanc.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 #include "pacs_commands.h"
 #include "temporal_bone_pipeline.h"
 

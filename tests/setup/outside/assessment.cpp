@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/statistics/agreement.h"
+#include "osteo/core/statistics/agreement.h"
 
 int main() {
   const std::array<int, 10> first{0, 0, 1, 1, 1, 2, 2, 2, 2, 0}, second{0, 0, 1, 1, 2, 2, 2, 2, 1, 0};

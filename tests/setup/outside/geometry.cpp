@@ -2,9 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/distance/triangle_tree.h"
-#include "osteo/distance/voxelize.h"
-#include "osteo/tets/grid_tets.h"
+#include "osteo/geometry/distance/triangle_tree.h"
+#include "osteo/geometry/distance/voxelize.h"
+#include "osteo/geometry/tets/grid_tets.h"
 
 int main() {
   osteo::TriangleSoup corner;  // of a cube of 6 mm, cut off: a sixth of it

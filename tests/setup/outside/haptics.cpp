@@ -1,7 +1,7 @@
 // Component haptics: a burr that is pressed into a block of bone feels it, and takes it away while it turns.
 #include <cstdio>
 
-#include "osteo/haptics/renderer.h"
+#include "osteo/simulation/haptics/renderer.h"
 
 int main() {
   osteo::Frame frame{.dims = {40, 40, 40}, .spacing_mm = {0.5, 0.5, 0.5}};

@@ -2,11 +2,11 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/dicom/import.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/volume_io.h"
 
 int main() {
   osteo::save_image(osteo::make_phantom({.region = osteo::PhantomRegion::temporal, .spacing_mm = 2}).ct, "ct.nrrd");

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/data/tri_mesh.h"
-#include "osteo/io/surface_io.h"
+#include "osteo/core/data/tri_mesh.h"
+#include "osteo/imaging/io/surface_io.h"
 
 int main() {
   osteo::TriMesh mesh;

@@ -1,9 +1,9 @@
 // Component pictures: cuts and a lit view of a CT, without a display.
 #include <cstdio>
 
-#include "osteo/image/phantom.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/view/snapshot.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/display/view/snapshot.h"
 
 int main() {
   const osteo::Phantom head = osteo::make_phantom({.region = osteo::PhantomRegion::temporal, .spacing_mm = 2});

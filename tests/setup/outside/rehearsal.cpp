@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "osteo/scene/rehearsal.h"
+#include "osteo/session/scene/rehearsal.h"
 
 int main() {
   osteo::Frame frame{.dims = {40, 40, 40}, .spacing_mm = {0.5, 0.5, 0.5}};

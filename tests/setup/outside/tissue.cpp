@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/tets/grid_tets.h"
-#include "osteo/tissue/statics.h"
+#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/simulation/tissue/statics.h"
 
 int main() {
   osteo::VoxelBits bar(osteo::Frame{.dims = {4, 4, 8}});  // cubes of 1 mm

@@ -5,18 +5,17 @@
 #include <filesystem>
 #include <fstream>
 
-#include "osteo/base/context.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/base/parallel.h"
-#include "osteo/base/param.h"
+#include "osteo/core/base/context.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/core/base/param.h"
 
 namespace osteo {
 enum class Colour : int { red, green };
-template <>
-struct EnumNames<Colour> {
-  static constexpr std::array<std::string_view, 2> values{"red", "green"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(Colour) {
+  return {"red", "green"};
+}
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include <random>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 
 namespace osteo {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/base/guarded.h"
+#include "osteo/core/base/guarded.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/base/json.h"
+#include "osteo/core/base/json.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "osteo/base/json_document.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo {
 namespace {
@@ -67,10 +67,9 @@ TEST(Json, WhatIsNoJsonIsToldWithItsLineAndWithoutTheLibrarysName) {
 
 enum class Colour : int { red, green };
 }  // namespace
-template <>
-struct EnumNames<Colour> {
-  static constexpr std::array<std::string_view, 2> values{"red", "green"};
-};
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(Colour) {
+  return {"red", "green"};
+}
 namespace {
 
 struct Part {

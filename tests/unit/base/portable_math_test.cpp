@@ -1,4 +1,4 @@
-#include "osteo/base/portable_math.h"
+#include "osteo/core/base/portable_math.h"
 
 #include <gtest/gtest.h>
 

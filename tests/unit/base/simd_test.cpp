@@ -1,8 +1,8 @@
-#include "osteo/base/simd.h"
+#include "osteo/core/base/simd.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

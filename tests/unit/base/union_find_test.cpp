@@ -1,4 +1,4 @@
-#include "osteo/base/union_find.h"
+#include "osteo/core/base/union_find.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "osteo/batch/batch.h"
+#include "osteo/hospital/batch/batch.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <iostream>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/batch/table.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/hospital/batch/table.h"
 
 namespace osteo {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "osteo/batch/children.h"
+#include "osteo/hospital/batch/children.h"
 
 namespace osteo {
 namespace {

@@ -1,12 +1,12 @@
-#include "osteo/bone/action.h"
+#include "osteo/simulation/bone/action.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
 #include "bar.h"
-#include "osteo/bone/plates.h"
-#include "osteo/bone/world.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo {
 namespace {

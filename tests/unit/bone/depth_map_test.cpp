@@ -1,8 +1,8 @@
-#include "osteo/bone/depth_map.h"
+#include "osteo/simulation/bone/depth_map.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

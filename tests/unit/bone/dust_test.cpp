@@ -5,7 +5,7 @@
 #include <memory>
 #include <random>
 
-#include "osteo/bone/dust.h"
+#include "osteo/simulation/bone/dust.h"
 #include "slab.h"
 #include "solid.h"
 

@@ -1,4 +1,4 @@
-#include "osteo/bone/instrument_gap.h"
+#include "osteo/simulation/bone/instrument_gap.h"
 
 #include <gtest/gtest.h>
 

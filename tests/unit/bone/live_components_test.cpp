@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/bone/live_components.h"
+#include "osteo/simulation/bone/live_components.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,5 @@
 // The live surface through very many edits: closed and manifold after each one, and equal to a rebuild.
-#include "osteo/bone/live_surface.h"
+#include "osteo/simulation/bone/live_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <unordered_map>
 
-#include "osteo/mesh/mesh_info.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 namespace {

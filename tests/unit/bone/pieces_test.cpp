@@ -4,11 +4,11 @@
 #include <numbers>
 
 #include "bar.h"
-#include "osteo/bone/pieces.h"
-#include "osteo/bone/rigid_transform.h"
-#include "osteo/bone/saw.h"
-#include "osteo/mesh/bone_surface.h"
-#include "osteo/mesh/mesh_info.h"
+#include "osteo/simulation/bone/pieces.h"
+#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/simulation/bone/saw.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 namespace {

@@ -1,6 +1,6 @@
 // Normals to light by, against the true ones of bodies whose CT is noisy and sliced, of cuts and edges; and local updates against a
 // rebuild.
-#include "osteo/bone/shading.h"
+#include "osteo/simulation/bone/shading.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <memory>
 #include <random>
 
-#include "osteo/bone/live_surface.h"
+#include "osteo/simulation/bone/live_surface.h"
 
 namespace osteo {
 namespace {

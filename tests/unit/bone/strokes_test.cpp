@@ -4,7 +4,7 @@
 #include <random>
 
 #include "bar.h"
-#include "osteo/bone/world.h"
+#include "osteo/simulation/bone/world.h"
 
 namespace osteo {
 namespace {

@@ -5,10 +5,10 @@
 #include <cstdio>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/bone/burr.h"
-#include "osteo/bone/structure_map.h"
-#include "osteo/bone/thickness.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/thickness.h"
 #include "solid.h"
 
 namespace osteo {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "osteo/bone/dust.h"
-#include "osteo/bone/posture.h"
+#include "osteo/simulation/bone/dust.h"
+#include "osteo/simulation/bone/posture.h"
 #include "slab.h"
 #include "solid.h"
 

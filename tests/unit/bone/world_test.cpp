@@ -1,4 +1,4 @@
-#include "osteo/bone/world.h"
+#include "osteo/simulation/bone/world.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,11 @@
 #include <random>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/bone/live_surface.h"
-#include "osteo/bone/plate_fit.h"
-#include "osteo/bone/plates.h"
-#include "osteo/mesh/mesh_info.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/simulation/bone/plate_fit.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 

@@ -1,11 +1,11 @@
-#include "osteo/bone_import/import_bone.h"
+#include "osteo/imaging/bone_import/import_bone.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "osteo/base/error.h"
-#include "osteo/dicom/save_series.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/save_series.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -1,5 +1,5 @@
 // Time to reach a view: the measure, and the simulated person that it is tried on.
-#include "osteo/camera/camera_trial.h"
+#include "osteo/simulation/camera/camera_trial.h"
 
 #include <gtest/gtest.h>
 

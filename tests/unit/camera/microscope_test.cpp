@@ -1,5 +1,5 @@
 // The microscope's optics and moves against exact values.
-#include "osteo/camera/microscope.h"
+#include "osteo/simulation/camera/microscope.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Arm, flights, undo, a device that moves the camera.
-#include "osteo/camera/scope_control.h"
+#include "osteo/simulation/camera/scope_control.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Two eyes: where each sees a place, by projecting it through its own frustum.
-#include "osteo/camera/stereo.h"
+#include "osteo/simulation/camera/stereo.h"
 
 #include <gtest/gtest.h>
 

@@ -9,9 +9,9 @@
 #include <numbers>
 #include <regex>
 
-#include "osteo/base/files.h"
-#include "osteo/case_report/case_report.h"
-#include "osteo/mesh/bone_surface.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/case_report/case_report.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 #include "pictures.h"
 #include "words.h"
 

@@ -1,11 +1,11 @@
-#include "osteo/cgal/mesh_cgal.h"
+#include "osteo/geometry/cgal/mesh_cgal.h"
 
 #include <gtest/gtest.h>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/distance/solid.h"
-#include "osteo/mesh/mesh_info.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/solid.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 namespace {

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/cli/command.h"
-#include "osteo/cli/report.h"
-#include "osteo/pipeline/pipeline.h"
-#include "osteo/stages/registry.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/cli/command.h"
+#include "osteo/app/cli/report.h"
+#include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/app/stages/registry.h"
 
 namespace osteo {
 namespace {

@@ -10,10 +10,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/devices/devices.h"
-#include "osteo/haptics/servo.h"
-#include "osteo/rt/loop.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/simulation/haptics/servo.h"
+#include "osteo/core/rt/loop.h"
 #include "slab.h"
 #include "virtual_arm.h"
 

@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "osteo/devices/devices.h"
-#include "osteo/haptics/simulated_device.h"
+#include "osteo/simulation/devices/devices.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 
 namespace osteo::test {
 

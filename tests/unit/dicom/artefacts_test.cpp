@@ -4,11 +4,11 @@
 #include <random>
 
 #include "edit.h"
-#include "osteo/base/error.h"
-#include "osteo/dicom/import.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/image/bone_threshold.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/imaging/image/bone_threshold.h"
+#include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {
 namespace {

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "osteo/base/files.h"
-#include "osteo/data/vec.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/image/phantom.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/data/vec.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/image/phantom.h"
 
 namespace osteo::test {
 

@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "edit.h"
-#include "osteo/dicom/import.h"
-#include "osteo/dicom/objects.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/imaging/io/volume_io.h"
 #include "reference.h"
 
 namespace osteo {

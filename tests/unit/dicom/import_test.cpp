@@ -2,10 +2,10 @@
 
 #include "edit.h"
 #include "oblique.h"
-#include "osteo/base/error.h"
-#include "osteo/dicom/import.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {
 namespace {

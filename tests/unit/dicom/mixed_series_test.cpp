@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "edit.h"
-#include "osteo/dicom/import.h"
-#include "osteo/dicom/volume.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/dicom/volume.h"
 #include "reference.h"
 
 namespace osteo {

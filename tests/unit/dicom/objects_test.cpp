@@ -10,9 +10,9 @@
 #include <gdcmImageWriter.h>
 
 #include "edit.h"
-#include "osteo/base/error.h"
-#include "osteo/dicom/objects.h"
-#include "osteo/dicom/volume.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/objects.h"
+#include "osteo/imaging/dicom/volume.h"
 
 namespace osteo {
 namespace {

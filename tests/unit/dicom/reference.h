@@ -4,7 +4,7 @@
 #include <random>
 
 #include "edit.h"
-#include "osteo/data/volume.h"
+#include "osteo/core/data/volume.h"
 
 namespace osteo::test {
 

@@ -7,10 +7,10 @@
 #include <random>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/distance/distance_map.h"
-#include "osteo/distance/swept_distance.h"
-#include "osteo/distance/thesis_distance.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/distance_map.h"
+#include "osteo/geometry/distance/swept_distance.h"
+#include "osteo/geometry/distance/thesis_distance.h"
 
 namespace osteo {
 namespace {

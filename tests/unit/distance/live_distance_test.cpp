@@ -4,8 +4,8 @@
 #include <random>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/distance/live_distance.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/live_distance.h"
 
 namespace osteo {
 namespace {

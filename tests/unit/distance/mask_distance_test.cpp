@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/distance/mask_distance.h"
-#include "osteo/grid/sampler.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/mask_distance.h"
+#include "osteo/geometry/grid/sampler.h"
 
 namespace osteo {
 namespace {

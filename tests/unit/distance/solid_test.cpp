@@ -1,11 +1,11 @@
 // What a surface bounds by the rule of the winding number, beside bodies whose volume is known.
-#include "osteo/distance/solid.h"
+#include "osteo/geometry/distance/solid.h"
 
 #include <gtest/gtest.h>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/distance/voxelize.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/distance/voxelize.h"
 
 namespace osteo {
 namespace {

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "meshes.h"
-#include "osteo/distance/distance_map.h"
-#include "osteo/distance/voxelize.h"
+#include "osteo/geometry/distance/distance_map.h"
+#include "osteo/geometry/distance/voxelize.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,5 @@
 // Correcting a mask: each operation against what it must give by a slow and plain way, the history, and the file.
-#include "osteo/edit/document.h"
+#include "osteo/imaging/edit/document.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <random>
 
 #include "edit_subject.h"
-#include "osteo/base/error.h"
-#include "osteo/edit/edit_file.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/edit/edit_file.h"
 #include "scratch.h"
 
 namespace osteo {

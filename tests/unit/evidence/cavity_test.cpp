@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "osteo/image/distance.h"
+#include "osteo/imaging/image/distance.h"
 #include "scene.h"
 
 namespace osteo {

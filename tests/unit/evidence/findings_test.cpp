@@ -1,7 +1,7 @@
 // Findings of scores made by hand: which sentences come, with which figures, in which order.
 #include <gtest/gtest.h>
 
-#include "osteo/evidence/findings.h"
+#include "osteo/assessment/evidence/findings.h"
 #include "scene.h"
 
 namespace osteo {

@@ -1,12 +1,12 @@
 // Rules of hints, and when they are said.
-#include "osteo/evidence/hints.h"
+#include "osteo/assessment/evidence/hints.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "osteo/base/error.h"
-#include "osteo/bone/instrument.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/instrument.h"
 #include "scene.h"
 
 namespace osteo {

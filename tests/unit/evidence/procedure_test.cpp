@@ -1,13 +1,13 @@
 // Procedure files: read strictly, errors with file, item and line.
-#include "osteo/evidence/procedure.h"
+#include "osteo/assessment/evidence/procedure.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/evidence/score.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/evidence/score.h"
 
 namespace osteo {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "cavity.h"
-#include "osteo/image/distance.h"
+#include "osteo/imaging/image/distance.h"
 #include "scene.h"
 
 namespace osteo {

@@ -3,11 +3,11 @@
 #include <functional>
 #include <memory>
 
-#include "osteo/bone/structure_map.h"
-#include "osteo/bone/world.h"
-#include "osteo/evidence/score.h"
-#include "osteo/evidence/visibility.h"
-#include "osteo/grid/brick_places.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
+#include "osteo/assessment/evidence/score.h"
+#include "osteo/assessment/evidence/visibility.h"
+#include "osteo/geometry/grid/brick_places.h"
 #include "soft_solid.h"
 
 namespace osteo::test {

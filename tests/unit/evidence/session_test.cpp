@@ -4,13 +4,13 @@
 #include <filesystem>
 
 #include "hole_script.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/evidence/score.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/score_reader.h"
-#include "osteo/session/apply.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/assessment/evidence/score.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/score_reader.h"
+#include "osteo/session/recording/apply.h"
 #include "scene.h"
 #include "scratch.h"
 

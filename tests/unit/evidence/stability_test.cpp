@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/evidence/product.h"
+#include "osteo/assessment/evidence/product.h"
 #include "scene.h"
 
 namespace osteo {

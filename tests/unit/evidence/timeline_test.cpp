@@ -3,9 +3,9 @@
 
 #include <numeric>
 
-#include "osteo/bone/instrument.h"
-#include "osteo/evidence/timeline.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/assessment/evidence/timeline.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scene.h"
 #include "scratch.h"
 

@@ -1,12 +1,12 @@
 // Seen or hidden: against every voxel's box, one by one.
-#include "osteo/evidence/visibility.h"
+#include "osteo/assessment/evidence/visibility.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "osteo/bone/instrument.h"
-#include "osteo/grid/brick_places.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/geometry/grid/brick_places.h"
 #include "scene.h"
 
 namespace osteo {

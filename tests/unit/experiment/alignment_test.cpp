@@ -1,13 +1,13 @@
 // The quick alignment beside the plain one, and what cannot be aligned.
-#include "osteo/experiment/alignment.h"
+#include "osteo/assessment/experiment/alignment.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "osteo/base/error.h"
-#include "osteo/statistics/basics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::experiment {
 namespace {

@@ -5,12 +5,12 @@
 #include <map>
 #include <set>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/experiment/analysis.h"
-#include "osteo/experiment/desk.h"
-#include "osteo/session/session_reader.h"
-#include "osteo/statistics/basics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/experiment/analysis.h"
+#include "osteo/assessment/experiment/desk.h"
+#include "osteo/session/recording/session_reader.h"
+#include "osteo/core/statistics/basics.h"
 
 namespace osteo::experiment {
 namespace {

@@ -1,13 +1,13 @@
 // Scores of recalls that are known.
-#include "osteo/experiment/recall.h"
+#include "osteo/assessment/experiment/recall.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "osteo/base/error.h"
-#include "osteo/experiment/stimulus.h"
+#include "osteo/core/base/error.h"
+#include "osteo/assessment/experiment/stimulus.h"
 
 namespace osteo::experiment {
 namespace {

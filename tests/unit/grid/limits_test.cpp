@@ -5,13 +5,13 @@
 
 #include <functional>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/grid/brick_grid.h"
-#include "osteo/grid/grid_io.h"
-#include "osteo/grid/resample.h"
-#include "osteo/grid/vdb.h"
-#include "osteo/image/threshold.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/grid/grid_io.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/grid/vdb.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 namespace {

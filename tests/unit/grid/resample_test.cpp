@@ -4,16 +4,16 @@
 #include <filesystem>
 
 #include "ball.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/dicom/volume.h"
-#include "osteo/grid/brick_grid.h"
-#include "osteo/grid/grid_io.h"
-#include "osteo/grid/resample.h"
-#include "osteo/grid/sampler.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/imaging/dicom/volume.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/grid/grid_io.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/geometry/grid/sampler.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 namespace {

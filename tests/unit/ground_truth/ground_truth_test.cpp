@@ -4,9 +4,9 @@
 #include <fstream>
 #include <numbers>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/ground_truth/experiments.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/ground_truth/experiments.h"
 #include "scratch.h"
 
 namespace osteo::truth {

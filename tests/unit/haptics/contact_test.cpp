@@ -6,11 +6,11 @@
 #include <numbers>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/base/simd.h"
-#include "osteo/bone/depth_map.h"
-#include "osteo/bone/live_surface.h"
-#include "osteo/haptics/servo.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/simd.h"
+#include "osteo/simulation/bone/depth_map.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/simulation/haptics/servo.h"
 #include "overlap_kernel.h"
 #include "slab.h"
 #include "solid.h"

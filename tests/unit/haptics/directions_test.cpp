@@ -1,7 +1,7 @@
 // Contact from each side alike: no method may prefer a direction of the voxels.
 #include <gtest/gtest.h>
 
-#include "osteo/haptics/contact.h"
+#include "osteo/simulation/haptics/contact.h"
 #include "solid.h"
 
 namespace osteo {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "duck.h"
-#include "osteo/haptics/fields.h"
+#include "osteo/simulation/haptics/fields.h"
 
 namespace osteo {
 namespace {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/haptics/renderer.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/haptics/renderer.h"
 #include "slab.h"
 #include "solid.h"
 #include "stability.h"

@@ -1,12 +1,12 @@
 // The law of one hand led by another, by itself and in the servo's step.
-#include "osteo/haptics/guide.h"
+#include "osteo/simulation/haptics/guide.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "osteo/haptics/renderer.h"
-#include "osteo/haptics/simulated_device.h"
+#include "osteo/simulation/haptics/renderer.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 #include "slab.h"
 
 namespace osteo {

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <set>
 
-#include "osteo/base/error.h"
-#include "osteo/haptics/servo.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/haptics/servo.h"
 #include "slab.h"
 
 namespace osteo {

@@ -4,9 +4,9 @@
 #include <complex>
 #include <numbers>
 
-#include "osteo/base/error.h"
-#include "osteo/haptics/device.h"
-#include "osteo/haptics/renderer.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/haptics/device.h"
+#include "osteo/simulation/haptics/renderer.h"
 #include "slab.h"
 
 namespace osteo {

@@ -1,5 +1,5 @@
 // A saw that cuts by force and time, in a cutting guide and without one.
-#include "osteo/haptics/saw_slot.h"
+#include "osteo/simulation/haptics/saw_slot.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <numbers>
 
 #include "bar.h"
-#include "osteo/grid/brick_places.h"
-#include "osteo/haptics/device.h"
-#include "osteo/haptics/renderer.h"
+#include "osteo/geometry/grid/brick_places.h"
+#include "osteo/simulation/haptics/device.h"
+#include "osteo/simulation/haptics/renderer.h"
 
 namespace osteo {
 namespace {

@@ -1,14 +1,14 @@
 // Readers that come and go while the servo publishes.
-#include "osteo/haptics/stream.h"
+#include "osteo/simulation/haptics/stream.h"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/haptics/servo.h"
-#include "osteo/haptics/simulated_device.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/haptics/servo.h"
+#include "osteo/simulation/haptics/simulated_device.h"
 #include "slab.h"
 
 namespace osteo {

@@ -1,10 +1,10 @@
-#include "osteo/haptics/texture.h"
+#include "osteo/simulation/haptics/texture.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

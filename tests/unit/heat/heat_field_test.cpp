@@ -1,5 +1,5 @@
 // Heat conduction against analytic solutions (Carslaw and Jaeger, Conduction of Heat in Solids, 2nd ed.) and its own balance.
-#include "osteo/heat/heat_field.h"
+#include "osteo/simulation/heat/heat_field.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "osteo/heat/thermal_dose.h"
+#include "osteo/simulation/heat/thermal_dose.h"
 
 #include <gtest/gtest.h>
 

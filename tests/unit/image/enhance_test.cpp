@@ -1,4 +1,4 @@
-#include "osteo/image/enhance.h"
+#include "osteo/imaging/image/enhance.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <random>
 
-#include "osteo/image/phantom.h"
+#include "osteo/imaging/image/phantom.h"
 #include "projections.h"
 
 namespace osteo {

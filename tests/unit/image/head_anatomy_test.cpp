@@ -1,5 +1,5 @@
 // The anatomy against what is published of sizes and distances (docs/phantom.md names the sources), for ten individuals.
-#include "osteo/image/head_anatomy.h"
+#include "osteo/imaging/image/head_anatomy.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "osteo/image/phantom.h"
+#include "osteo/imaging/image/phantom.h"
 
 namespace osteo {
 namespace {

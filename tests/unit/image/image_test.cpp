@@ -4,11 +4,11 @@
 #include <map>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/image/components.h"
-#include "osteo/image/distance.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/image/components.h"
+#include "osteo/imaging/image/distance.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 namespace {

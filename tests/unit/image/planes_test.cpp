@@ -1,4 +1,4 @@
-#include "osteo/image/planes.h"
+#include "osteo/imaging/image/planes.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 
 #include "cv_slices.h"
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <functional>
 
-#include "osteo/base/error.h"
-#include "osteo/image/threshold.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/image/threshold.h"
 
 namespace osteo {
 namespace {

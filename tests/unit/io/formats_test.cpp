@@ -4,12 +4,12 @@
 #include <fstream>
 
 #include "oblique.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/image/phantom.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/io/tet_io.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/imaging/io/tet_io.h"
+#include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {
 namespace {

@@ -1,13 +1,13 @@
 // Segments of 3D Slicer, one by one. Files as Slicer writes them: tests/readers/check_slicer.py.
-#include "osteo/io/segments.h"
+#include "osteo/imaging/io/segments.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/io/volume_io.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/io/volume_io.h"
 
 namespace osteo {
 namespace {

@@ -1,10 +1,10 @@
 // Calibration by rendered views of the plate; the printed pages.
-#include "osteo/marker/camera.h"
+#include "osteo/simulation/marker/camera.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
-#include "osteo/marker/sheet.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/marker/sheet.h"
 #include "render.h"
 
 namespace osteo {

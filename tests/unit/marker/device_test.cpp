@@ -1,5 +1,5 @@
 // The pen as a hand: pictures are handed in one by one, so nothing hangs on the machine's speed.
-#include "osteo/marker/device.h"
+#include "osteo/simulation/marker/device.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <deque>
 #include <opencv2/videoio.hpp>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "render.h"
 
 namespace osteo {

@@ -1,12 +1,12 @@
 // The tip of a pen, the filter behind the pictures, cameras and pens as files.
-#include "osteo/marker/pen.h"
+#include "osteo/simulation/marker/pen.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/marker/camera.h"
-#include "osteo/marker/filter.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/marker/camera.h"
+#include "osteo/simulation/marker/filter.h"
 #include "render.h"
 
 namespace osteo {

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "osteo/marker/tracker.h"
+#include "osteo/simulation/marker/tracker.h"
 
 namespace osteo::test {
 

@@ -1,8 +1,8 @@
-#include "osteo/marker/tracker.h"
+#include "osteo/simulation/marker/tracker.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "render.h"
 
 namespace osteo {

@@ -1,4 +1,4 @@
-#include "osteo/mesh/bone_surface.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/base/error.h"
-#include "osteo/mesh/curve.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/mesh/curve.h"
 
 namespace osteo {
 namespace {

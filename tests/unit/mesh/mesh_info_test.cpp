@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/mesh/mesh_info.h"
+#include "osteo/core/base/error.h"
+#include "osteo/geometry/mesh/mesh_info.h"
 
 namespace osteo {
 namespace {

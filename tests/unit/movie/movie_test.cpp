@@ -1,5 +1,5 @@
 // Movies of small sessions, read back by OpenCV: how many pictures, what is seen in them, what is not in the file.
-#include "osteo/movie/movie.h"
+#include "osteo/assessment/movie/movie.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "evidence/scene.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/movie/movie_file.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/assessment/movie/movie_file.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "rewrite_session.h"
 #include "scratch.h"
 

@@ -1,13 +1,13 @@
 // Nerves alone: thresholds against the published fit, what silences, what fires, the middle line of a tube.
-#include "osteo/nerve/nerve_model.h"
+#include "osteo/simulation/nerve/nerve_model.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "osteo/base/error.h"
-#include "osteo/nerve/stimulator.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/nerve/stimulator.h"
 
 namespace osteo {
 namespace {

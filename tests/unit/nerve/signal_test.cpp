@@ -5,10 +5,10 @@
 #include <cstring>
 #include <fstream>
 
-#include "osteo/base/files.h"
-#include "osteo/nerve/activity.h"
-#include "osteo/nerve/blackrock.h"
-#include "osteo/nerve/electromyogram.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/nerve/activity.h"
+#include "osteo/simulation/nerve/blackrock.h"
+#include "osteo/simulation/nerve/electromyogram.h"
 #include "scratch.h"
 
 namespace osteo {

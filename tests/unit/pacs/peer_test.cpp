@@ -1,13 +1,13 @@
 // How a node is named, and what is counted.
-#include "osteo/pacs/peer.h"
+#include "osteo/hospital/pacs/peer.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "osteo/base/error.h"
-#include "osteo/pacs/receive.h"
-#include "osteo/pacs/send.h"
+#include "osteo/core/base/error.h"
+#include "osteo/hospital/pacs/receive.h"
+#include "osteo/hospital/pacs/send.h"
 
 namespace osteo {
 namespace {

@@ -1,9 +1,9 @@
 // Which rule a series gets, and what of rules is refused.
-#include "osteo/pacs/rules.h"
+#include "osteo/hospital/pacs/rules.h"
 
 #include <gtest/gtest.h>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

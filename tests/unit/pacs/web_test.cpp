@@ -5,8 +5,8 @@
 
 #include "http.h"
 #include "multipart.h"
-#include "osteo/base/error.h"
-#include "osteo/pacs/dicomweb.h"
+#include "osteo/core/base/error.h"
+#include "osteo/hospital/pacs/dicomweb.h"
 
 namespace osteo {
 namespace {

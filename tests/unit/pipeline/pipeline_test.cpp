@@ -1,14 +1,14 @@
 // Pipelines of toy stages: what is run again, what is kept, what is never replaced, what the record says.
-#include "osteo/pipeline/pipeline.h"
+#include "osteo/imaging/pipeline/pipeline.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/pipeline/formats.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/pipeline/formats.h"
 
 namespace osteo {
 namespace {

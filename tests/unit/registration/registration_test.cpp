@@ -1,4 +1,4 @@
-#include "osteo/registration/register.h"
+#include "osteo/imaging/registration/register.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <numbers>
 #include <sstream>
 
-#include "osteo/base/error.h"
-#include "osteo/dicom/import.h"
-#include "osteo/image/crop.h"
-#include "osteo/image/phantom.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/imaging/image/crop.h"
+#include "osteo/imaging/image/phantom.h"
 #include "second_scan.h"
 
 namespace osteo {

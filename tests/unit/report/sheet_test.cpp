@@ -1,5 +1,5 @@
 // A sheet written as HTML and PDF: whole, readable again, the same for the same, and on its pages.
-#include "osteo/report/sheet.h"
+#include "osteo/core/report/sheet.h"
 
 #include <gtest/gtest.h>
 

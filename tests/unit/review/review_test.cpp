@@ -1,17 +1,17 @@
 // A review made by hand: what its page and its JSON say, and that it asks for nothing; and the parts of its scene.
-#include "osteo/review/review.h"
+#include "osteo/assessment/review/review.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "evidence/scene.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/grid/brick_places.h"
-#include "osteo/review/heat_sheet.h"
-#include "osteo/view/stills.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/geometry/grid/brick_places.h"
+#include "osteo/assessment/review/heat_sheet.h"
+#include "osteo/display/view/stills.h"
 #include "scene_parts.h"
 #include "scratch.h"
 

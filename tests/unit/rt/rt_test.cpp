@@ -15,10 +15,10 @@
 #include <thread>
 #include <vector>
 
-#include "osteo/rt/histogram.h"
-#include "osteo/rt/loop.h"
-#include "osteo/rt/ring.h"
-#include "osteo/rt/seqlock.h"
+#include "osteo/core/rt/histogram.h"
+#include "osteo/core/rt/loop.h"
+#include "osteo/core/rt/ring.h"
+#include "osteo/core/rt/seqlock.h"
 
 namespace osteo {
 namespace {

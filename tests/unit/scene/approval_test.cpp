@@ -1,14 +1,14 @@
 // An approval holds for what was looked at, and for nothing else.
-#include "osteo/scene/approval.h"
+#include "osteo/session/scene/approval.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/report/sheet.h"
-#include "osteo/scene/session_folder.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/report/sheet.h"
+#include "osteo/session/scene/session_folder.h"
 
 namespace osteo {
 namespace {

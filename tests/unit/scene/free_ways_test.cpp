@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <functional>
 
-#include "osteo/bone/burr.h"
-#include "osteo/bone/structure_map.h"
-#include "osteo/dicom/import.h"
-#include "osteo/grid/resample.h"
-#include "osteo/haptics/renderer.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/structures.h"
-#include "osteo/image/threshold.h"
-#include "osteo/scene/free_ways.h"
+#include "osteo/simulation/bone/burr.h"
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/simulation/haptics/renderer.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/structures.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/session/scene/free_ways.h"
 
 namespace osteo {
 namespace {

@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/export.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/export.h"
 #include "scratch.h"
 
 namespace osteo {

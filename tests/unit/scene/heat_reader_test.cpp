@@ -1,13 +1,13 @@
 // Heat of a rehearsal: the same live and in a replay, in balance, less with water, nothing without a burr.
-#include "osteo/scene/heat_reader.h"
+#include "osteo/session/scene/heat_reader.h"
 
 #include <gtest/gtest.h>
 
 #include "bar.h"
 #include "evidence/scene.h"
-#include "osteo/scene/heat_score.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/session/scene/heat_score.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/session_reader.h"
 #include "scratch.h"
 
 namespace osteo {

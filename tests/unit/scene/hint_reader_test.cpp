@@ -1,10 +1,10 @@
 // Hints while a session runs: what is seen follows from the bone as it is then.
-#include "osteo/scene/hint_reader.h"
+#include "osteo/session/scene/hint_reader.h"
 
 #include <gtest/gtest.h>
 
 #include "evidence/scene.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,5 @@
 // The nerve monitor's sound without a sound card: how soon a touch is heard, what is silent.
-#include "osteo/scene/monitor_sound.h"
+#include "osteo/session/scene/monitor_sound.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "ear.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/scene/monitor_reader.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/session/scene/monitor_reader.h"
 
 namespace osteo {
 namespace {

@@ -6,10 +6,10 @@
 #include <map>
 
 #include "ear.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/monitor_reader.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/monitor_reader.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 
 namespace osteo {

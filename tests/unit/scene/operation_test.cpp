@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/bone/plates.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/session_file.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/session_file.h"
 #include "scratch.h"
 
 namespace osteo {

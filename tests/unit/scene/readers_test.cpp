@@ -1,5 +1,5 @@
 // Readers of a rehearsal: who joins and leaves, who reads a file, and strokes that are taken back.
-#include "osteo/scene/reader.h"
+#include "osteo/session/scene/reader.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 
 #include "bar.h"
 #include "hole_script.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/session_reader.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/session_reader.h"
 #include "rewrite_session.h"
 #include "scratch.h"
 

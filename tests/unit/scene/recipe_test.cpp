@@ -1,14 +1,14 @@
 // A case remembers what it was asked for, and is either the old or the new one.
-#include "osteo/scene/recipe.h"
+#include "osteo/session/scene/recipe.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <fstream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/case.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/case.h"
 
 namespace osteo {
 namespace {

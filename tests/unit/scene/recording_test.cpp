@@ -14,9 +14,9 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/session_folder.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
 #include "rewrite_session.h"
 #include "stalling_disk.h"
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "osteo/bone/burr.h"
+#include "osteo/simulation/bone/burr.h"
 
 namespace osteo {
 namespace {

@@ -7,12 +7,12 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/files.h"
-#include "osteo/bone/plates.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/scene/session_folder.h"
-#include "osteo/session/script_file.h"
-#include "osteo/session/session_file.h"
+#include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
+#include "osteo/session/recording/script_file.h"
+#include "osteo/session/recording/session_file.h"
 
 namespace osteo {
 namespace {

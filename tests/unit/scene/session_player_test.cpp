@@ -1,13 +1,13 @@
 // A session looked at as of any time: the same bone as the file gives, whichever way one comes.
-#include "osteo/scene/session_player.h"
+#include "osteo/session/scene/session_player.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "evidence/scene.h"
-#include "osteo/base/error.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -7,9 +7,9 @@
 #include <set>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "other_session.h"
 #include "rewrite_session.h"
 #include "scratch.h"

@@ -1,5 +1,5 @@
 // Soft tissue under the tool: felt, deterministic in a replay, free where there is none.
-#include "osteo/scene/soft_tissue.h"
+#include "osteo/session/scene/soft_tissue.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/session_file.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/session_file.h"
 #include "scratch.h"
 #include "tissue/block.h"
 

@@ -1,5 +1,5 @@
 // Several bodies of soft tissue and several hands: felt together, asleep while nothing is near, held aside, pressed deep.
-#include "osteo/scene/soft_tissue.h"
+#include "osteo/session/scene/soft_tissue.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,11 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/io/tet_io.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/session_file.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/imaging/io/tet_io.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/session_file.h"
 #include "scratch.h"
 #include "tissue/block.h"
 

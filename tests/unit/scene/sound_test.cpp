@@ -1,5 +1,5 @@
 // What is heard of a rehearsal follows from its stream, live and from a file.
-#include "osteo/scene/sound.h"
+#include "osteo/session/scene/sound.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/files.h"
 #include "scratch.h"
 
 namespace osteo {

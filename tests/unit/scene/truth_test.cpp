@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-#include "osteo/grid/brick_grid.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/mesh/bone_surface.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/session/scene/rehearsal.h"
 
 namespace osteo {
 namespace {

@@ -1,11 +1,11 @@
-#include "osteo/segment/ear.h"
+#include "osteo/imaging/segment/ear.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "ear_truth.h"
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo::test {
 namespace {

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <vector>
 
-#include "osteo/image/distance.h"
-#include "osteo/image/phantom.h"
-#include "osteo/segment/ear.h"
+#include "osteo/imaging/image/distance.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/segment/ear.h"
 
 namespace osteo::test {
 

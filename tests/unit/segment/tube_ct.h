@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "osteo/base/parallel.h"
-#include "osteo/data/volume.h"
-#include "osteo/segment/tube.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/core/data/volume.h"
+#include "osteo/imaging/segment/tube.h"
 
 namespace osteo::test {
 

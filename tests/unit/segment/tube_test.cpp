@@ -1,11 +1,11 @@
-#include "osteo/segment/tube.h"
+#include "osteo/imaging/segment/tube.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "osteo/base/error.h"
-#include "osteo/image/phantom.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/image/phantom.h"
 #include "tube_ct.h"
 
 namespace osteo::test {

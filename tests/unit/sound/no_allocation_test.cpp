@@ -6,7 +6,7 @@
 #include <new>
 #include <vector>
 
-#include "osteo/sound/synthesizer.h"
+#include "osteo/simulation/sound/synthesizer.h"
 
 // Sanitizers have an allocator of their own.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)

@@ -1,5 +1,5 @@
 // The synthesiser against the model's table: lines where and as loud as it says, noise too, and nothing that clicks.
-#include "osteo/sound/synthesizer.h"
+#include "osteo/simulation/sound/synthesizer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "osteo/sound/wav.h"
+#include "osteo/simulation/sound/wav.h"
 
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <cstring>
 
-#include "osteo/base/files.h"
+#include "osteo/core/base/files.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -1,4 +1,4 @@
-#include "osteo/stage/stage.h"
+#include "osteo/core/stage/stage.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "osteo/stages/mesh.h"
+#include "osteo/app/stages/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/data/tet_mesh.h"
-#include "osteo/stages/segment.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/data/tet_mesh.h"
+#include "osteo/app/stages/segment.h"
 
 namespace osteo {
 namespace {

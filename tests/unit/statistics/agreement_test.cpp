@@ -1,7 +1,7 @@
 // Agreement of raters: tables of textbooks, other people's programs, and what happens when there is nothing to agree about.
-#include "osteo/statistics/agreement.h"
+#include "osteo/core/statistics/agreement.h"
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "reference.h"
 
 namespace osteo::statistics {

@@ -1,9 +1,9 @@
 // What everything else stands on: ranks, quantiles, random numbers, the bootstrap.
-#include "osteo/statistics/basics.h"
+#include "osteo/core/statistics/basics.h"
 
 #include <array>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "reference.h"
 
 namespace osteo::statistics {

@@ -1,9 +1,9 @@
 // Comparison of groups, correlation, decisions: as Python's libraries, by definition, and where there is too little.
-#include "osteo/statistics/compare.h"
+#include "osteo/core/statistics/compare.h"
 
-#include "osteo/base/error.h"
-#include "osteo/statistics/correlation.h"
-#include "osteo/statistics/decide.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/statistics/correlation.h"
+#include "osteo/core/statistics/decide.h"
 #include "reference.h"
 
 namespace osteo::statistics {

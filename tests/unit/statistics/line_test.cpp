@@ -1,12 +1,12 @@
 // Intervals that are drawn, against the formulas in NumPy with Student's quantiles from tables.
-#include "osteo/statistics/line.h"
+#include "osteo/core/statistics/line.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo::statistics {
 namespace {

@@ -1,7 +1,7 @@
 // Smoothness against values that others computed from the same definitions, and what filtering does to it.
-#include "osteo/statistics/movement.h"
+#include "osteo/core/statistics/movement.h"
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "reference.h"
 
 namespace osteo::statistics {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
 
 namespace osteo::statistics {
 

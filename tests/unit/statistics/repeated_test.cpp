@@ -1,8 +1,8 @@
 // People who come several times, and curves that only rise.
-#include "osteo/statistics/repeated.h"
+#include "osteo/core/statistics/repeated.h"
 
-#include "osteo/base/error.h"
-#include "osteo/statistics/isotonic.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/statistics/isotonic.h"
 #include "reference.h"
 
 namespace osteo::statistics {

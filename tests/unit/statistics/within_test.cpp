@@ -1,7 +1,7 @@
 // The same people under several conditions, beside statsmodels, pingouin and SciPy.
-#include "osteo/statistics/within.h"
+#include "osteo/core/statistics/within.h"
 
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "reference.h"
 
 namespace osteo::statistics {

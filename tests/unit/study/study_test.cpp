@@ -1,5 +1,5 @@
 // A study from its first file to its report: what is written, what is refused and where, and what the analysis says of too little.
-#include "osteo/study/study.h"
+#include "osteo/assessment/study/study.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <regex>
 #include <set>
 
-#include "osteo/base/files.h"
-#include "osteo/base/param.h"
-#include "osteo/statistics/basics.h"
-#include "osteo/study/analysis.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
+#include "osteo/core/statistics/basics.h"
+#include "osteo/assessment/study/analysis.h"
 #include "scratch.h"
 
 namespace osteo::study {

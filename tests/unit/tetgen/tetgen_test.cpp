@@ -1,12 +1,12 @@
-#include "osteo/tetgen/mesh_tetgen.h"
+#include "osteo/geometry/tetgen/mesh_tetgen.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/data/tet_check.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/data/tet_check.h"
 
 namespace osteo {
 namespace {

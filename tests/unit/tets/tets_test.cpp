@@ -8,15 +8,15 @@
 #include <fstream>
 
 #include "meshes.h"
-#include "osteo/base/error.h"
-#include "osteo/data/tet_check.h"
-#include "osteo/distance/compare.h"
-#include "osteo/io/tet_io.h"
-#include "osteo/tets/graded_tets.h"
-#include "osteo/tets/grid_tets.h"
-#include "osteo/tets/quality.h"
-#include "osteo/tets/skin.h"
-#include "osteo/tets/stuffing.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/data/tet_check.h"
+#include "osteo/geometry/distance/compare.h"
+#include "osteo/imaging/io/tet_io.h"
+#include "osteo/geometry/tets/graded_tets.h"
+#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/geometry/tets/quality.h"
+#include "osteo/geometry/tets/skin.h"
+#include "osteo/geometry/tets/stuffing.h"
 
 namespace osteo {
 namespace {

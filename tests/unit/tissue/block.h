@@ -4,8 +4,8 @@
 #include <functional>
 #include <map>
 
-#include "osteo/tets/grid_tets.h"
-#include "osteo/tissue/fem.h"
+#include "osteo/geometry/tets/grid_tets.h"
+#include "osteo/simulation/tissue/fem.h"
 
 namespace osteo::test {
 

@@ -1,5 +1,5 @@
 // Stiffness by density against closed forms, and a graded bar against the integral of its compliance.
-#include "osteo/tissue/bone_stiffness.h"
+#include "osteo/simulation/tissue/bone_stiffness.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 
 #include "block.h"
 #include "calculix.h"
-#include "osteo/base/error.h"
-#include "osteo/io/inp_io.h"
-#include "osteo/tissue/problem.h"
-#include "osteo/tissue/statics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/io/inp_io.h"
+#include "osteo/simulation/tissue/problem.h"
+#include "osteo/simulation/tissue/statics.h"
 
 namespace osteo {
 namespace {

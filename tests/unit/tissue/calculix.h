@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/data/tet_mesh.h"
+#include "osteo/core/data/tet_mesh.h"
 #include "scratch.h"
 
 namespace osteo::test {

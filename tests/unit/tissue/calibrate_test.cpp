@@ -1,11 +1,11 @@
-#include "osteo/tissue/calibrate.h"
+#include "osteo/simulation/tissue/calibrate.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "block.h"
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 
 namespace osteo {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/tissue/contact.h"
+#include "osteo/simulation/tissue/contact.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/dynamics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/dynamics.h"
 
 namespace osteo {
 namespace {

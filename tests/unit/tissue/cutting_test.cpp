@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "block.h"
-#include "osteo/tissue/voxel_cutting.h"
+#include "osteo/simulation/tissue/voxel_cutting.h"
 
 namespace osteo {
 namespace {

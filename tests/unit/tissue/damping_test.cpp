@@ -1,4 +1,4 @@
-#include "osteo/tissue/damping.h"
+#include "osteo/simulation/tissue/damping.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/calibrate.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/calibrate.h"
 
 namespace osteo {
 namespace {

@@ -1,4 +1,4 @@
-#include "osteo/tissue/dynamics.h"
+#include "osteo/simulation/tissue/dynamics.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/equilibrium.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/equilibrium.h"
 
 namespace osteo {
 namespace {

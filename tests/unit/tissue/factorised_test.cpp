@@ -6,10 +6,10 @@
 
 #include "block.h"
 #include "block_factor.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/dynamics.h"
-#include "osteo/tissue/equilibrium.h"
-#include "osteo/tissue/voxel_cutting.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/dynamics.h"
+#include "osteo/simulation/tissue/equilibrium.h"
+#include "osteo/simulation/tissue/voxel_cutting.h"
 
 namespace osteo {
 namespace {

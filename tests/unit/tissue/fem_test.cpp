@@ -1,7 +1,7 @@
 // Finite elements against analytic answers, and against CalculiX where it is installed.
-#include "osteo/tissue/fem.h"
+#include "osteo/simulation/tissue/fem.h"
 
-#include "osteo/tissue/problem.h"
+#include "osteo/simulation/tissue/problem.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@
 #include "calculix.h"
 #include "derivatives.h"
 #include "mapped.h"
-#include "osteo/base/error.h"
+#include "osteo/core/base/error.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -1,5 +1,5 @@
 // Long steps against short ones, against statics, and where short ones would take for ever.
-#include "osteo/tissue/implicit.h"
+#include "osteo/simulation/tissue/implicit.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/calibrate.h"
-#include "osteo/tissue/dynamics.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/calibrate.h"
+#include "osteo/simulation/tissue/dynamics.h"
 
 namespace osteo {
 namespace {

@@ -1,12 +1,12 @@
-#include "osteo/tissue/measured.h"
+#include "osteo/simulation/tissue/measured.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
 #include "scanned.h"
 #include "surface_goal.h"
 

@@ -1,4 +1,4 @@
-#include "osteo/tissue/tissue_model.h"
+#include "osteo/simulation/tissue/tissue_model.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 
 #include "block.h"
 #include "derivatives.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/equilibrium.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/equilibrium.h"
 
 namespace osteo {
 namespace {

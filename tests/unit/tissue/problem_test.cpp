@@ -1,13 +1,13 @@
-#include "osteo/tissue/problem.h"
+#include "osteo/simulation/tissue/problem.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/io/inp_io.h"
-#include "osteo/tissue/calibrate.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/io/inp_io.h"
+#include "osteo/simulation/tissue/calibrate.h"
 
 namespace osteo {
 namespace {

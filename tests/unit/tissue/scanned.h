@@ -6,7 +6,7 @@
 #include <string>
 
 #include "block.h"
-#include "osteo/tissue/measured.h"
+#include "osteo/simulation/tissue/measured.h"
 
 namespace osteo::test {
 

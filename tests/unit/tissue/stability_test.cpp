@@ -5,9 +5,9 @@
 #include <random>
 
 #include "block.h"
-#include "osteo/base/error.h"
-#include "osteo/tissue/dynamics.h"
-#include "osteo/tissue/equilibrium.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/tissue/dynamics.h"
+#include "osteo/simulation/tissue/equilibrium.h"
 
 namespace osteo {
 namespace {

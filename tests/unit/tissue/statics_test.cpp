@@ -1,5 +1,5 @@
 // Movements, gravity and contact, against what is known in closed form and against CalculiX.
-#include "osteo/tissue/statics.h"
+#include "osteo/simulation/tissue/statics.h"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 
 #include "block.h"
 #include "calculix.h"
-#include "osteo/base/error.h"
-#include "osteo/io/inp_io.h"
-#include "osteo/io/tet_io.h"
-#include "osteo/tissue/nodes_vtu.h"
-#include "osteo/tissue/problem.h"
+#include "osteo/core/base/error.h"
+#include "osteo/imaging/io/inp_io.h"
+#include "osteo/imaging/io/tet_io.h"
+#include "osteo/simulation/tissue/nodes_vtu.h"
+#include "osteo/simulation/tissue/problem.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -6,12 +6,12 @@
 #include <filesystem>
 
 #include "../evidence/scene.h"
-#include "osteo/base/error.h"
-#include "osteo/scene/rehearsal.h"
-#include "osteo/session/simulated.h"
-#include "osteo/trainee/group.h"
-#include "osteo/trainee/simulate.h"
-#include "osteo/trainee/trainee_hand.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/recording/simulated.h"
+#include "osteo/assessment/trainee/group.h"
+#include "osteo/assessment/trainee/simulate.h"
+#include "osteo/assessment/trainee/trainee_hand.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "osteo/tutor/live.h"
+#include "osteo/network/tutor/live.h"
 #include "sim_network.h"
 
 namespace osteo {

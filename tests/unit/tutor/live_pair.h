@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "bar.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/haptics/simulated_device.h"
-#include "osteo/tutor/live.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/simulation/haptics/simulated_device.h"
+#include "osteo/network/tutor/live.h"
 #include "sim_network.h"
 
 namespace osteo::test {

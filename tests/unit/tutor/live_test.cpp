@@ -1,5 +1,5 @@
 // Live tutoring over a network that is simulated: the same bone on both sides, hands that stay together, nothing that swings.
-#include "osteo/tutor/live.h"
+#include "osteo/network/tutor/live.h"
 
 #include <gtest/gtest.h>
 

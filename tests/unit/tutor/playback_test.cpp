@@ -1,14 +1,14 @@
 // A recorded hand leads another: how near it stays, that bone is the recorded one, that the guided session replays to the bit.
-#include "osteo/tutor/playback.h"
+#include "osteo/network/tutor/playback.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "bar.h"
-#include "osteo/base/error.h"
-#include "osteo/bone/instrument.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "osteo/tutor/wire.h"
+#include "osteo/network/tutor/wire.h"
 
 namespace osteo::test {
 

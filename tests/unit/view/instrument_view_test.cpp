@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "osteo/io/surface_io.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/instrument_view.h"
-#include "osteo/view/offscreen.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/instrument_view.h"
+#include "osteo/display/view/offscreen.h"
 
 namespace osteo {
 namespace {

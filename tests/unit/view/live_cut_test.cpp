@@ -1,5 +1,5 @@
 // Pixels and outlines of cuts against bodies known in closed form.
-#include "osteo/view/live_cut.h"
+#include "osteo/display/view/live_cut.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <numbers>
 
-#include "osteo/bone/instrument.h"
-#include "osteo/grid/brick_grid.h"
-#include "osteo/mesh/bone_surface.h"
-#include "osteo/view/cut_outline.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/geometry/grid/brick_grid.h"
+#include "osteo/geometry/mesh/bone_surface.h"
+#include "osteo/display/view/cut_outline.h"
 #include "solid.h"
 
 namespace osteo {

@@ -14,13 +14,13 @@
 #include <numbers>
 #include <thread>
 
-#include "osteo/io/surface_io.h"
-#include "osteo/io/vtk_data.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/bone_view.h"
-#include "osteo/view/changes.h"
-#include "osteo/view/offscreen.h"
-#include "osteo/view/wet_film.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/changes.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/wet_film.h"
 #include "solid.h"
 
 namespace osteo {

@@ -1,5 +1,5 @@
 // Regions of a procedure around a ball of known size.
-#include "osteo/view/planned_regions.h"
+#include "osteo/display/view/planned_regions.h"
 
 #include <gtest/gtest.h>
 #include <vtkGenericOpenGLRenderWindow.h>
@@ -9,10 +9,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/bone/live_surface.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/bone_view.h"
-#include "osteo/view/offscreen.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/offscreen.h"
 #include "solid.h"
 
 namespace osteo {

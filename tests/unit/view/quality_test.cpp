@@ -1,5 +1,5 @@
 // Which level is chosen for which times.
-#include "osteo/view/quality.h"
+#include "osteo/display/view/quality.h"
 
 #include <gtest/gtest.h>
 

@@ -8,11 +8,11 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/io/surface_io.h"
-#include "osteo/scene/scene_readers.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/offscreen.h"
-#include "osteo/view/world_view.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/session/scene/scene_readers.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/world_view.h"
 #include "solid.h"
 
 namespace osteo {

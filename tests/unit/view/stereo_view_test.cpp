@@ -12,9 +12,9 @@
 #include <cmath>
 #include <string>
 
-#include "osteo/view/actors.h"
-#include "osteo/view/offscreen.h"
-#include "osteo/view/scope_camera.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/scope_camera.h"
 
 namespace osteo {
 namespace {

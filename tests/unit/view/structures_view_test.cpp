@@ -1,5 +1,5 @@
 // Structures as they are drawn, against bodies known in closed form.
-#include "osteo/view/structures_view.h"
+#include "osteo/display/view/structures_view.h"
 
 #include <gtest/gtest.h>
 #include <vtkGenericOpenGLRenderWindow.h>
@@ -11,9 +11,9 @@
 #include <functional>
 #include <numbers>
 
-#include "osteo/view/actors.h"
-#include "osteo/view/cut_outline.h"
-#include "osteo/view/offscreen.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/cut_outline.h"
+#include "osteo/display/view/offscreen.h"
 
 namespace osteo {
 namespace {

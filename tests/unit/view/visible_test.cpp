@@ -1,4 +1,4 @@
-#include "osteo/view/visible.h"
+#include "osteo/display/view/visible.h"
 
 #include <gtest/gtest.h>
 

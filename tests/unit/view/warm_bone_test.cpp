@@ -7,11 +7,11 @@
 
 #include <array>
 
-#include "osteo/bone/live_surface.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/bone_view.h"
-#include "osteo/view/changes.h"
-#include "osteo/view/offscreen.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/changes.h"
+#include "osteo/display/view/offscreen.h"
 #include "solid.h"
 
 namespace osteo {

@@ -9,13 +9,13 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "osteo/bone/live_surface.h"
-#include "osteo/io/surface_io.h"
-#include "osteo/view/actors.h"
-#include "osteo/view/bone_view.h"
-#include "osteo/view/changes.h"
-#include "osteo/view/offscreen.h"
-#include "osteo/view/wet_film.h"
+#include "osteo/simulation/bone/live_surface.h"
+#include "osteo/imaging/io/surface_io.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/bone_view.h"
+#include "osteo/display/view/changes.h"
+#include "osteo/display/view/offscreen.h"
+#include "osteo/display/view/wet_film.h"
 #include "solid.h"
 
 namespace osteo {

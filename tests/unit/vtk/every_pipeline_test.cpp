@@ -6,12 +6,12 @@
 #include <fstream>
 #include <regex>
 
-#include "osteo/base/files.h"
-#include "osteo/base/json_document.h"
-#include "osteo/pipeline/engine.h"
-#include "osteo/pipeline/report_json.h"
-#include "osteo/stages/registry.h"
-#include "osteo/vtk/pipeline.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/imaging/pipeline/engine.h"
+#include "osteo/imaging/pipeline/report_json.h"
+#include "osteo/app/stages/registry.h"
+#include "osteo/app/vtk/pipeline.h"
 #include "scratch.h"
 
 namespace osteo {

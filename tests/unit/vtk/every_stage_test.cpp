@@ -16,18 +16,18 @@
 
 #include <fstream>
 
-#include "osteo/base/files.h"
-#include "osteo/dicom/save_series.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/phantom.h"
-#include "osteo/image/threshold.h"
-#include "osteo/io/vtk_data.h"
-#include "osteo/stages/edit.h"
-#include "osteo/stages/mesh.h"
-#include "osteo/stages/registry.h"
-#include "osteo/tissue/calibrate.h"
-#include "osteo/vtk/vtkOsteoDataObject.h"
-#include "osteo/vtk/vtkOsteoStage.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/dicom/save_series.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/phantom.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/app/stages/edit.h"
+#include "osteo/app/stages/mesh.h"
+#include "osteo/app/stages/registry.h"
+#include "osteo/simulation/tissue/calibrate.h"
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
+#include "osteo/app/vtk/vtkOsteoStage.h"
 
 namespace osteo {
 namespace {

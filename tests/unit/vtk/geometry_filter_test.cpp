@@ -6,11 +6,11 @@
 #include <vtkSphereSource.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "osteo/stages/distance.h"
-#include "osteo/stages/mesh.h"
-#include "osteo/tets/skin.h"
-#include "osteo/vtk/vtkOsteoDataObject.h"
-#include "osteo/vtk/vtkOsteoStage.h"
+#include "osteo/app/stages/distance.h"
+#include "osteo/app/stages/mesh.h"
+#include "osteo/geometry/tets/skin.h"
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
+#include "osteo/app/vtk/vtkOsteoStage.h"
 
 namespace osteo {
 namespace {

@@ -12,13 +12,13 @@
 #include <cmath>
 #include <cstdio>
 
-#include "osteo/base/files.h"
-#include "osteo/bone_import/import_bone.h"
-#include "osteo/dicom/import.h"
-#include "osteo/grid/resample.h"
-#include "osteo/image/threshold.h"
-#include "osteo/io/vtk_data.h"
-#include "osteo/mesh/bone_surface.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/bone_import/import_bone.h"
+#include "osteo/imaging/dicom/import.h"
+#include "osteo/geometry/grid/resample.h"
+#include "osteo/imaging/image/threshold.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo {
 namespace {

@@ -1,5 +1,5 @@
 // A pipeline file as a pipeline of VTK: what runs and what does not, what is written, how it ends early; of toy stages that count.
-#include "osteo/vtk/pipeline.h"
+#include "osteo/app/vtk/pipeline.h"
 
 #include <gtest/gtest.h>
 #include <vtkAlgorithmOutput.h>
@@ -10,11 +10,11 @@
 
 #include <fstream>
 
-#include "osteo/base/error.h"
-#include "osteo/base/files.h"
-#include "osteo/io/volume_io.h"
-#include "osteo/io/vtk_data.h"
-#include "osteo/vtk/vtkOsteoDataObject.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/imaging/io/volume_io.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/app/vtk/vtkOsteoDataObject.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <thread>
 
-#include "osteo/base/files.h"
+#include "osteo/core/base/files.h"
 #include "scratch.h"
 
 namespace osteo {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/haptics/guide.h"
+#include "osteo/simulation/haptics/guide.h"
 #include "rehearsal_control.h"
 
 namespace osteo {

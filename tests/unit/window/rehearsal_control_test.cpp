@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "bar.h"
-#include "osteo/base/files.h"
+#include "osteo/core/base/files.h"
 #include "scratch.h"
 
 namespace osteo {

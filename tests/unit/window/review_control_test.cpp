@@ -7,8 +7,8 @@
 
 #include "evidence/scene.h"
 #include "hint_desk.h"
-#include "osteo/base/error.h"
-#include "osteo/scene/rehearsal.h"
+#include "osteo/core/base/error.h"
+#include "osteo/session/scene/rehearsal.h"
 #include "review_panel.h"
 #include "review_scene.h"
 #include "scratch.h"

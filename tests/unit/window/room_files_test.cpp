@@ -4,8 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "osteo/base/files.h"
-#include "osteo/window/person_settings.h"
+#include "osteo/core/base/files.h"
+#include "osteo/app/window/person_settings.h"
 #include "scratch.h"
 #include "start_list.h"
 

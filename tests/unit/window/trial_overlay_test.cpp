@@ -6,7 +6,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "osteo/base/files.h"
+#include "osteo/core/base/files.h"
 
 namespace osteo {
 namespace {

@@ -1,7 +1,7 @@
 // What we write is, byte for byte, what OpenIGTLink's own library writes, and what it reads. Where it is installed.
 #include <gtest/gtest.h>
 
-#include "osteo/wire/igtl.h"
+#include "osteo/network/wire/igtl.h"
 #ifdef OSTEO_WITH_OPENIGTLINK
 #include <igtlNDArrayMessage.h>
 #include <igtlSensorMessage.h>

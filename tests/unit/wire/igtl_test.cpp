@@ -1,5 +1,5 @@
 // OpenIGTLink's bytes: against published ones, and against everything that can be wrong with them.
-#include "osteo/wire/igtl.h"
+#include "osteo/network/wire/igtl.h"
 
 #include <gtest/gtest.h>
 

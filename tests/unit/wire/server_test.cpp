@@ -1,5 +1,5 @@
 // Server, client, tracked hand and remote monitor, over the loopback.
-#include "osteo/wire/server.h"
+#include "osteo/network/wire/server.h"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -12,12 +12,12 @@
 #include <cmath>
 #include <thread>
 
-#include "osteo/base/error.h"
-#include "osteo/rt/loop.h"
-#include "osteo/wire/client.h"
-#include "osteo/wire/remote_monitor.h"
-#include "osteo/wire/stream_feed.h"
-#include "osteo/wire/tracked_hand.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/rt/loop.h"
+#include "osteo/network/wire/client.h"
+#include "osteo/network/wire/remote_monitor.h"
+#include "osteo/network/wire/stream_feed.h"
+#include "osteo/network/wire/tracked_hand.h"
 
 namespace osteo {
 namespace {

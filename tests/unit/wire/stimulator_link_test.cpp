@@ -1,5 +1,5 @@
 // The stimulator over the network: who has the code sets it, and nobody else does.
-#include "osteo/wire/stimulator_link.h"
+#include "osteo/network/wire/stimulator_link.h"
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <random>
 #include <thread>
 
-#include "osteo/wire/remote_monitor.h"
+#include "osteo/network/wire/remote_monitor.h"
 
 namespace osteo {
 namespace {

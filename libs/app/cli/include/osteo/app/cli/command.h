@@ -1,0 +1,116 @@
+// Commands: stages and the verbs beside them (run, prepare, rehearse, ...), all declared by the same kind of Params struct.
+#pragma once
+#include <iosfwd>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "osteo/core/base/context.h"
+#include "osteo/core/base/param.h"
+#include "osteo/core/stage/stage.h"
+
+namespace osteo::inline app::cli {
+
+enum class ProgressStyle : int { automatic, bar, json, slicer, none };
+
+}  // namespace osteo::app::cli
+
+namespace osteo::inline app {
+[[nodiscard]] constexpr std::array<std::string_view, 5> enum_names(cli::ProgressStyle) {
+  return {"auto", "bar", "json", "slicer", "none"};
+}
+}  // namespace osteo::app
+
+namespace osteo::inline app::cli {
+
+/// Flags that every command has.
+struct Common {
+  struct Params {
+    int threads = 0;
+    bool force = false;
+    bool quiet = false;
+    bool json = false;
+    ProgressStyle progress = ProgressStyle::automatic;
+    int seed = 1;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"threads", "worker threads (0: all cores); results do not depend on it", "", 0, 1024}, p.threads);
+    visit({"force", "replace outputs that exist"}, p.force);
+    visit({"quiet", "no progress and no notes, only errors"}, p.quiet);
+    visit({"json", "print what was done as JSON on standard output"}, p.json);
+    visit({"progress",
+           "bar or JSON lines on standard error, Slicer's form on standard output and all notes with it; auto: a bar on a terminal"},
+          p.progress);
+    visit({"seed", "of random choices", "", 0, 2147483647}, p.seed);
+  }
+};
+
+struct Positional {
+  std::string name, help;
+  bool optional = false;
+};
+
+struct CommandInfo {
+  std::string name, synopsis, description;
+  std::vector<Positional> positionals;
+  std::string example;
+  bool takes_settings = false;  ///< --set NAME=VALUE
+};
+
+/// What a verb gets to work with.
+struct Invocation {
+  const Registry& registry;
+  Common::Params common;
+  std::vector<std::string> arguments;                         ///< positionals, in order
+  std::set<std::string> given;                                ///< names of the fields that were on the command line, whatever their value
+  std::vector<std::pair<std::string, std::string>> settings;  ///< --set k=v, in order
+  Context context;
+  std::ostream& out;
+  std::ostream& err;
+  /// Ends the progress bar, so that text does not run into it.
+  std::function<void()> end_progress;
+};
+
+/// A verb. C has `struct Params`, `describe`, `static CommandInfo info()`, `static int run(const Params&, Invocation&)`.
+class Command {
+ public:
+  virtual ~Command() = default;
+  [[nodiscard]] virtual const CommandInfo& info() const = 0;
+  [[nodiscard]] virtual std::vector<FieldRef> fields() = 0;
+  virtual int run(Invocation& invocation) const = 0;
+};
+
+template <class C>
+class CommandOf final : public Command {
+ public:
+  [[nodiscard]] const CommandInfo& info() const override {
+    static const CommandInfo value = C::info();
+    return value;
+  }
+  [[nodiscard]] std::vector<FieldRef> fields() override { return fields_of<C>(params_); }
+  int run(Invocation& invocation) const override { return C::run(params_, invocation); }
+
+ private:
+  typename C::Params params_;
+};
+
+struct Program {
+  Registry registry;
+  std::vector<std::unique_ptr<Command>> commands;
+  std::string about;    ///< one line
+  std::string licence;  ///< for --version
+  template <class C>
+  void add() {
+    commands.push_back(std::make_unique<CommandOf<C>>());
+  }
+  [[nodiscard]] Command* find(std::string_view name) const;
+};
+
+/// The whole of a command-line program: parses, runs, reports errors, returns the exit code. stdout carries data only. With --json a
+/// failure is told there too: { "error": { "exit_code", "name", "message", "advice" } }, and beside it what the stage had to show of it,
+/// such as the "verdict" on a refused scan.
+int run_program(Program& program, int argc, char** argv, std::ostream& out, std::ostream& err);
+
+}  // namespace osteo::app::cli

@@ -1,0 +1,57 @@
+#include "osteo/app/stages/curve.h"
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/core/data/points_io.h"
+
+namespace osteo::inline app {
+
+StageInfo CurveStage::info() {
+  return {.name = "curve",
+          .version = 1,
+          .synopsis = "where a curve holds a moving hand, and with what force",
+          .description =
+              "Runs the curve constraint over a path, point after point, as the haptic thread would: the place on the curve that minimises "
+              "distance "
+              "plus a penalty on the way from the last place, found exactly, and the spring's force.",
+          .inputs = {{"curve", {DataKind::source}, "text file of the curve's points in order"},
+                     {"path", {DataKind::source}, "text file of the hand's positions in order"}},
+          .outputs = {{"places", {DataKind::document}, "one entry a position, in JSON"}},
+          .references = {"D. Morris, Haptics and Physical Simulation for Virtual Bone Surgery, 2006, section 6.2"},
+          .example = "osteo curve incision.csv hand.csv places.json --arc-penalty 0.3"};
+}
+
+std::vector<Data> CurveStage::run(const Params& p, std::span<const Data> inputs, const Context& context) {
+  if (p.release_mm < p.engage_mm) throw Error(ExitCode::usage, "--release-mm is smaller than --engage-mm: the constraint would flutter");
+  const std::vector<Vec3> points = load_points(std::get<Source>(inputs[0]).path), path = load_points(std::get<Source>(inputs[1]).path);
+  const Curve curve(points);
+  CurveConstraint constraint(curve, p);
+  Json places = Json::list();
+  double farthest = 0, jump = 0, before = 0;
+  bool held = false;
+  const auto triple = [](Vec3 v) { return Json{v.x, v.y, v.z}; };
+  for (const Vec3 x : path) {
+    const auto a = constraint.update(x);
+    places.push_back({{"engaged", a.engaged},
+                      {"place_mm", triple(a.place.point_mm)},
+                      {"arc_mm", a.place.arc_mm},
+                      {"distance_mm", a.place.distance_mm},
+                      {"force_n", triple(a.force_n)}});
+    farthest = std::max(farthest, a.place.distance_mm);
+    if (held && a.engaged) jump = std::max(jump, std::abs(a.place.arc_mm - before));
+    held = a.engaged;
+    before = a.place.arc_mm;
+  }
+  context.report("curve_points", static_cast<std::int64_t>(points.size()));
+  context.report("curve_length_mm", curve.length_mm());
+  context.report("positions", static_cast<std::int64_t>(path.size()));
+  context.report("farthest_mm", farthest);
+  context.report("largest_step_along_mm", jump);
+  Json j;
+  j["curve_length_mm"] = curve.length_mm();
+  j["places"] = std::move(places);
+  context.progress(1.0);
+  return {Document{j.dump(1) + "\n"}};
+}
+
+}  // namespace osteo::app

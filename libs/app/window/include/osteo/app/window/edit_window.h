@@ -1,0 +1,39 @@
+// The window of 'osteo edit': three slices and the bone in 3D, tools, structures. GLFW, Dear ImGui and VTK in one OpenGL context.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "osteo/imaging/edit/document.h"
+
+namespace osteo::inline app {
+
+struct EditWindowOptions {
+  int width = 1360, height = 860;  ///< made smaller where the screen is
+  std::string title;
+  std::filesystem::path state_file;  ///< what the window shows is written there as JSON after each picture, for tests; empty: nowhere
+};
+
+/// How a save ended.
+struct EditSaved {
+  bool ok = false;
+  std::string text;  ///< what was written, or why it was not
+};
+
+/// What the window asks of whoever runs it.
+struct EditWindowActions {
+  /// Begins to write the corrections (the text of edits.json) into the case; returns at once.
+  std::function<void(const std::string& edits)> save;
+  /// How the save ended, once; nothing while it is at work or none was begun.
+  std::function<std::optional<EditSaved>()> saved;
+  /// Asked before each picture: whether the window is to close.
+  std::function<bool()> stop;
+};
+
+/// Opens a window and runs until it is closed; asks before it closes with corrections that were not saved. Nothing of the scan is written
+/// anywhere. Returns the number of OpenGL errors seen (0 when all is well). Error(failed) when no window can be opened.
+/// Mouse and keys: docs/edit.md, and F1 in the window.
+int run_edit_window(EditDocument& document, const EditWindowOptions& options, const EditWindowActions& actions);
+
+}  // namespace osteo::app

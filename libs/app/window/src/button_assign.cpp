@@ -1,0 +1,48 @@
+#include "button_assign.h"
+
+#include <algorithm>
+
+namespace osteo::inline app {
+namespace {
+
+enum : int { kEscape = 256, kDelete = 261, kF1 = 290, kF10 = 299, kFirstModifier = 340, kLastModifier = 347 };
+
+}  // namespace
+
+std::string words_of(HandFunction function) {
+  std::string name(EnumNames<HandFunction>::values[static_cast<std::size_t>(function)]);
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string ButtonAssign::take(int button, HandButtons& buttons) {
+  if (!for_) return {};
+  const std::string does = words_of(*for_), name = button_name(button);
+  if (button == kEscape) {
+    cancel();
+    return "no button was given";
+  }
+  if (button == kDelete) {
+    for (const int b : buttons.buttons_of(*for_)) buttons.clear(b);
+    cancel();
+    return does + " has no button now; its keys of the table (F1) go on";
+  }
+  if (button == kF1 || button == kF10) return name + " stays what it is: help and the panel are reached by it; press another, or Esc";
+  if (button >= kFirstModifier && button <= kLastModifier) return "Shift, Ctrl and Alt go with other keys; press another, or Esc";
+  const std::optional<HandFunction> before = buttons.assign(button, *for_);
+  std::string said = name + ": " + does;
+  if (before == for_) {
+    said += ", as before";
+  } else if (before) {
+    said += "; no longer " + words_of(*before);
+  } else if (const Key* const key = find_key(button); key != nullptr && key->command != command_of(*for_).command) {
+    for (const HelpLine& line : help_lines()) {
+      if (std::find(line.commands.begin(), line.commands.end(), key->command) == line.commands.end()) continue;
+      said += std::string("; no longer: ") + line.text;
+    }
+  }
+  cancel();
+  return said;
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,136 @@
+#include "osteo/app/window/console_window.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <fstream>
+#include <optional>
+
+#include "monitor_panel.h"
+#include "monitor_screen.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/json_document.h"
+#include "osteo/app/window/audio_out.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+constexpr int kEscapeKey = 256, kF11Key = 300;  // GLFW's numbers
+
+// The card plays what the desk sounds like; the desk is exchanged while it is kept out.
+class ConsoleSound {
+ public:
+  explicit ConsoleSound(bool on) {
+    if (!on) return;
+    try {
+      card_.emplace([this](std::span<float> out) {
+        std::fill(out.begin(), out.end(), 0.0F);
+        if (sound_ != nullptr) sound_->mix(out);
+      });
+    } catch (const Error& e) {
+      failure_ = e.what();
+    }
+  }
+  void follow(MonitorSound* sound) {
+    if (!card_) return;
+    const AudioOut::Pause pause(*card_);
+    sound_ = sound;
+  }
+  [[nodiscard]] std::string words() const {
+    return card_ ? "sound through " + card_->driver() : failure_.empty() ? "no sound" : "no sound: " + failure_;
+  }
+
+ private:
+  MonitorSound* sound_ = nullptr;
+  std::string failure_;
+  std::optional<AudioOut> card_;
+};
+
+void write_state(const std::filesystem::path& file, const ConsoleFacts& facts, MonitorDesk* desk, bool answers, std::uint64_t pictures) {
+  if (file.empty()) return;
+  Json j{{"page", "console"},        {"pictures", pictures}, {"connected", facts.connected}, {"ended", facts.ended},
+         {"samples", facts.samples}, {"lost", facts.lost},   {"events", facts.events},       {"trouble", facts.trouble}};
+  if (desk != nullptr) {
+    j["channels"] = desk->wiring().labels();
+    j["answers"] = answers;
+    j["seconds"] = desk->screen().view().now_s;
+    j["lines"] = desk->screen().events();
+    j["alarm"] = desk->screen().alarm();
+    j["frozen"] = desk->screen().frozen();
+    j["stimulates"] = desk->stimulates();
+    if (desk->stimulates()) {
+      const StimulatorSetting now = desk->stimulator();
+      j["current_ma"] = now.current_ma;
+      j["search"] = now.search;
+    }
+    if (const auto found = desk->screen().threshold_ma()) j["threshold_ma"] = *found;
+    j["muted"] = desk->sound().muted();
+    j["gains_uv"] = Json::list();
+    for (std::size_t ch = 0; ch < desk->wiring().channels.size(); ++ch) j["gains_uv"].push_back(desk->screen().gain_uv(ch));
+  }
+  const std::filesystem::path beside = file.string() + ".new";
+  std::ofstream(beside) << j.dump() << '\n';
+  std::error_code ignored;
+  std::filesystem::rename(beside, file, ignored);
+}
+
+}  // namespace
+
+void run_console_window(WindowShell& shell, const ConsoleOptions& options) {
+  shell.set_title("Osteotome nerve monitor - " + options.server);
+  std::shared_ptr<MonitorDesk> desk;
+  ConsoleSound sound(options.sound);
+  MonitorPanel panel;
+  bool close = false;
+  shell.on_key = [&](int key, int action, int) {
+    if (action != 1) return;
+    if (key == 'Q' || key == kEscapeKey) close = true;
+    if (key == kF11Key) shell.toggle_full_screen();
+    if (key == 'G') panel.show_answers(!panel.answers());
+    if (!desk) return;
+    if (key == 'F') desk->screen().freeze(!desk->screen().frozen());
+    if (key == 'M') desk->sound().mute(!desk->sound().muted());
+    if (key == 'S') panel.switch_stimulator(*desk);
+    if (key == 'T') panel.find_threshold(*desk);
+  };
+  std::uint64_t pictures = 0;
+  while (!close && !shell.closing() && !(options.stop && options.stop())) {
+    if (!shell.poll()) continue;
+    if (std::shared_ptr<MonitorDesk> now = options.desk(); now != desk) {
+      sound.follow(now ? &now->sound() : nullptr);
+      desk = std::move(now);
+    }
+    const ConsoleFacts facts = options.facts();
+    shell.new_frame();
+    const auto w = static_cast<float>(shell.width()), h = static_cast<float>(shell.height());
+    const float e = em(), foot = ImGui::GetFrameHeight() + e * 0.9F;
+    if (desk) {
+      panel.fill({0, 0, w, h - foot});
+      panel.draw(*desk);
+    } else {
+      begin_fixed("waiting", {0, 0, w, h - foot});
+      ImGui::TextWrapped(
+          "Waiting for a nerve monitor at %s: 'osteo rehearse CASE --stream igtl:PORT', or 'osteo stream SESSION --to igtl:PORT'.",
+          options.server.c_str());
+      ImGui::End();
+    }
+    begin_fixed("foot", {0, h - foot, w, foot}, ImGuiWindowFlags_NoScrollbar);
+    if (!facts.trouble.empty()) {
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+      ImGui::TextUnformatted(("! " + facts.trouble).c_str());
+      ImGui::PopStyleColor();
+    } else {
+      ImGui::TextDisabled("%s  %s%s  %s  F freeze  M mute  G view%s  Q close", options.server.c_str(),
+                          facts.ended ? "the session has ended" : "connected",
+                          facts.lost > 0 ? (", " + std::to_string(facts.lost) + " samples lost on the way").c_str() : "",
+                          sound.words().c_str(), desk && desk->stimulates() ? "  S stimulator  T threshold" : "");
+    }
+    ImGui::End();
+    shell.show_page();
+    write_state(options.state_file, facts, desk.get(), panel.answers(), ++pictures);
+  }
+  sound.follow(nullptr);
+}
+
+}  // namespace osteo::app

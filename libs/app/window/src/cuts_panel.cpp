@@ -1,0 +1,411 @@
+#include "cuts_panel.h"
+
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "slice_overlay.h"
+
+namespace osteo::inline app {
+namespace {
+
+constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                                    ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse;
+constexpr ImU32 kHead = IM_COL32(255, 170, 60, 240), kShaft = IM_COL32(190, 200, 215, 220), kPlanned = IM_COL32(255, 90, 220, 230);
+
+float scale_now() {
+  return ImGui::GetFontSize() / 13;
+}
+
+// A blade as a closed body; endless sides are longer than any head.
+TriMesh blade_of(const SawCut& cut) {
+  constexpr double kEndless = 600;
+  const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(cut.along, n)), deep = cross(n, along);
+  const Vec3 half[3] = {n * (cut.kerf_mm / 2), along * ((cut.length_mm > 0 ? cut.length_mm : kEndless) / 2),
+                        deep * ((cut.depth_mm > 0 ? cut.depth_mm : kEndless) / 2)};
+  TriMesh box;
+  for (int c = 0; c < 8; ++c) {
+    box.points_mm.push_back(
+        to_floats(cut.at_mm + half[0] * ((c & 1) != 0 ? 1 : -1) + half[1] * ((c & 2) != 0 ? 1 : -1) + half[2] * ((c & 4) != 0 ? 1 : -1)));
+  }
+  box.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                   {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return box;
+}
+
+// Kept in the session: what could be seen is part of what was done.
+void note_look(Rehearsal& rehearsal, const StructuresView::One& s) {
+  rehearsal.note("structure", note_of(s.value, rehearsal.structures()->name_of(s.value), s.look));
+}
+
+bool small_button(const char* words, bool chosen) {
+  if (chosen) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+  const bool clicked = ImGui::SmallButton(words);
+  if (chosen) ImGui::PopStyleColor();
+  return clicked;
+}
+
+}  // namespace
+
+void CutsPanel::create() {
+  glGenTextures(CutsControl::kCuts, textures_.data());
+  for (const unsigned t : textures_) {
+    glBindTexture(GL_TEXTURE_2D, t);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  }
+  glBindTexture(GL_TEXTURE_2D, 0);
+}
+
+void CutsPanel::release() {
+  glDeleteTextures(CutsControl::kCuts, textures_.data());
+}
+
+void CutsPanel::set_case(const std::optional<Image>& scan, const SparseGrid* hu, const std::vector<SparseGrid>& bone) {
+  if (scan) {
+    ct_ = ct_under_mouse_ = std::make_shared<const CtValues>(*scan);  // a dense one any thread may ask
+  } else if (hu != nullptr) {
+    ct_ = std::make_shared<const CtValues>(*hu);
+    ct_under_mouse_ = std::make_shared<const CtValues>(*hu);
+  }
+  before_.clear();
+  for (const SparseGrid& b : bone) before_.push_back(std::make_shared<const GridSampler>(b));
+}
+
+CutsLook CutsPanel::look() const {
+  return {control_.hu.width,
+          control_.hu.level,
+          control_.preset(),
+          control_.planes() == CutsControl::Planes::tool,
+          control_.follows(),
+          shown_.tint_removed,
+          regions_ == nullptr || regions_->shown()};
+}
+
+void CutsPanel::take(const CutsLook& look) {
+  if (look.preset >= 0 && look.preset < static_cast<int>(grey_presets().size())) control_.take_preset(look.preset);
+  control_.hu = {look.window_hu, look.level_hu};
+  control_.follow(look.follow);
+  control_.take_planes(look.along_tool ? CutsControl::Planes::tool : CutsControl::Planes::body);
+  shown_.tint_removed = look.removed;
+}
+
+void CutsPanel::begin(Rehearsal& rehearsal, StructuresView* structures, RegionsView* regions) {
+  structures_ = structures;
+  regions_ = regions;
+  notes_.begin();
+  std::vector<CutStructure> outlined;
+  if (structures != nullptr) {
+    for (const StructuresView::One& s : structures->all()) {
+      outlined.push_back({s.value, s.surface});
+      if (s.look != StructureLook::solid) note_look(rehearsal, s);  // as the session before left it
+    }
+  }
+  for (std::size_t r = 0; regions != nullptr && r < regions->all().size(); ++r)
+    outlined.push_back({CutStructure::kRegion + static_cast<int>(r), regions->all()[r].surface});
+  double voxel_mm = 0.5;
+  rehearsal.look([&](const World& world, SceneReaders&) {
+    voxel_mm = world.finest_voxel_mm();
+    Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+    for (const PlacedBody& b : world.bodies()) {
+      const BrickGrid& bone = b.body->bone;
+      for (std::uint32_t brick = 0; brick < bone.brick_count(); ++brick) {
+        const Ijk at = bone.brick_coordinate(brick);
+        const Vec3 p = b.world_from_body(bone.frame().world_from_index({at.i * 8 + 3.5, at.j * 8 + 3.5, at.k * 8 + 3.5}));
+        for (std::size_t a = 0; a < 3; ++a) {
+          lo[a] = std::min(lo[a], p[a]);
+          hi[a] = std::max(hi[a], p[a]);
+        }
+      }
+    }
+    if (lo.x > hi.x) lo = hi = {};
+    control_.set_bounds(lo, hi, voxel_mm);
+  });
+  constexpr double kPixelsToAVoxel = 2.5;  // more would show nothing that a smooth enlargement does not
+  drawer_.show(ct_, before_, std::move(outlined), voxel_mm / kPixelsToAVoxel);
+  drawn_ = {};
+}
+
+void CutsPanel::lay_out(const RoomLayout& room) {
+  middle_ = scene_ = room.view;
+  header_ = footer_ = {};
+  boxes_ = {};
+  // Header above, reading below: at fixed places, whatever they say.
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float line = ImGui::GetFontSize() + style.ItemSpacing.y, pad = 2 * style.WindowPadding.y;
+  const float top = 4 * (line + 2) + pad - style.ItemSpacing.y, bottom = 2 * line + pad - style.ItemSpacing.y;
+  if (!room.column.empty()) {
+    const ScreenBox& c = room.column;
+    header_ = {c.x, c.y, c.width, std::min(top, c.height)};
+    footer_ = {c.x, std::max(c.y, c.bottom() - bottom), c.width, std::min(bottom, c.height)};
+    const float each = std::floor((c.height - top - bottom) / CutsControl::kCuts);
+    for (std::size_t n = 0; n < boxes_.size(); ++n) boxes_[n] = {c.x, c.y + top + static_cast<float>(n) * each, c.width, each - 2};
+  } else if (!room.cuts[0].empty()) {
+    boxes_ = room.cuts;
+    ScreenBox& first = boxes_.front();
+    header_ = {first.x, first.y, first.width, std::min(top, first.height)};
+    first = {first.x, first.y + header_.height, first.width, first.height - header_.height};
+    ScreenBox& last = boxes_.back();
+    footer_ = {last.x, std::max(last.y, last.bottom() - bottom), last.width, std::min(bottom, last.height)};
+    last.height -= footer_.height;
+  }
+  for (std::size_t c = 0; c < boxes_.size(); ++c) {
+    if (static_cast<int>(c) == control_.enlarged() && !header_.empty()) {
+      scene_ = boxes_[c];
+      boxes_[c] = middle_;
+    }
+    control_.resize(static_cast<int>(c), static_cast<int>(boxes_[c].width), static_cast<int>(boxes_[c].height));
+  }
+}
+
+void CutsPanel::upload(DrawnCut cut) {
+  const auto n = static_cast<std::size_t>(cut.cut);
+  glBindTexture(GL_TEXTURE_2D, textures_[n]);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, cut.view.width, cut.view.height, 0, GL_RGBA, GL_UNSIGNED_BYTE, cut.rgba.data());
+  glBindTexture(GL_TEXTURE_2D, 0);
+  cut.rgba = {};
+  drawn_[n] = std::move(cut);
+}
+
+// What the cuts are to show now, and what of it has been drawn.
+void CutsPanel::take(Rehearsal& rehearsal) {
+  if (!drawer_.busy()) {
+    shown_.parts.clear();
+    shown_.removed_mm3 = rehearsal.removed_mm3();
+    rehearsal.look([&](const World& world, SceneReaders&) {
+      for (const PlacedBody& b : world.bodies()) shown_.parts.push_back({b.body, b.world_from_body.inverse()});
+    });
+    shown_.hu = control_.hu;
+  }
+  std::array<std::optional<SliceView>, 3> views;
+  for (std::size_t c = 0; c < views.size(); ++c) {
+    if (boxes_[c].width > 8 && boxes_[c].height > 8) views[c] = control_.view(static_cast<int>(c));
+  }
+  for (DrawnCut& cut : drawer_.next(views, shown_)) upload(std::move(cut));
+}
+
+void CutsPanel::draw(Rehearsal& rehearsal, const SawCut* planned) {
+  const TickRecord tick = rehearsal.latest();
+  control_.tool_is(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm), normalized(from_floats(tick.device.axis)));
+  if (const auto note = notes_.next(look(), ImGui::GetTime())) rehearsal.note("cuts", *note);
+  if (header_.empty()) return;
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0);
+  header(rehearsal);
+  mouse_in_ = false;
+  for (int c = 0; c < CutsControl::kCuts; ++c) one_cut(c, rehearsal, planned);
+  if (!mouse_in_) control_.move({});
+  readout(rehearsal);
+  ImGui::PopStyleVar();
+  if (list_open_ && structures_ != nullptr) list_structures(rehearsal);
+  take(rehearsal);
+}
+
+void CutsPanel::header(const Rehearsal& rehearsal) {
+  ImGui::SetNextWindowPos({header_.x, header_.y});
+  ImGui::SetNextWindowSize({header_.width, header_.height});
+  ImGui::Begin("Cuts", nullptr, kFixed);
+  // Its left edge moves.
+  const ImVec2 begins = ImGui::GetCursorPos();
+  ImGui::SetCursorPos({0, 0});
+  ImGui::InvisibleButton("edge", {5, ImGui::GetWindowHeight()});
+  if (ImGui::IsItemHovered() || ImGui::IsItemActive()) ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+  if (ImGui::IsItemActive()) wished_width_ = header_.width - ImGui::GetIO().MouseDelta.x;
+  ImGui::SetCursorPos(begins);
+  static constexpr const char* kShort[] = {"Bone", "Soft", "Temporal"};
+  for (int p = 0; p < static_cast<int>(grey_presets().size()); ++p) {
+    if (p > 0) ImGui::SameLine();
+    if (small_button(kShort[p], control_.preset() == p)) control_.take_preset(p);
+    if (ImGui::IsItemHovered()) {
+      const HuWindow& hu = grey_presets()[static_cast<std::size_t>(p)].hu;
+      ImGui::SetTooltip(
+          "window %.0f, level %.0f HU. Drag with the right button in a cut to change it; right click: back to this.%s", hu.width, hu.level,
+          ct_ && !ct_->soft_tissue() ? "\nThe case keeps CT values of bone only: soft tissue stays black without --scan." : "");
+    }
+  }
+  bool follows = control_.follows();
+  if (ImGui::Checkbox("follow", &follows)) control_.follow(follows);
+  ImGui::SameLine();
+  const bool along = control_.planes() == CutsControl::Planes::tool;
+  if (small_button("along the drill (F4)", along)) control_.take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  ImGui::Checkbox("removed", &shown_.tint_removed);
+  if (before_.empty()) shown_.tint_removed = false;
+  if (rehearsal.structures() != nullptr) {
+    ImGui::SameLine();
+    const std::string words = "structures (" + std::to_string(rehearsal.structures()->values().size()) + ")";
+    if (small_button(words.c_str(), list_open_)) list_open_ = !list_open_;
+  }
+  if (regions_ != nullptr) {
+    ImGui::SameLine();
+    if (small_button("plan", regions_->shown())) regions_->show(!regions_->shown());
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("what the procedure wants removed (green) or left (orange); Ctrl-L");
+  }
+  ImGui::TextDisabled("%.0f / %.0f HU   F3: %s", control_.hu.width, control_.hu.level, control_.enlarged() >= 0 ? "back" : "in the middle");
+  ImGui::End();
+}
+
+void CutsPanel::mouse_over(int cut, float corner_x, float corner_y) {
+  const bool hovered = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
+  if (!hovered && !active) return;
+  mouse_in_ = true;
+  const ImGuiIO& io = ImGui::GetIO();
+  const SlicePointer at{cut, static_cast<double>(io.MousePos.x - corner_x) - 0.5, static_cast<double>(io.MousePos.y - corner_y) - 0.5,
+                        io.KeyShift, io.KeyCtrl};
+  control_.move(at);
+  constexpr std::pair<ImGuiMouseButton, SliceButton> kButtons[] = {{ImGuiMouseButton_Left, SliceButton::left},
+                                                                   {ImGuiMouseButton_Right, SliceButton::right},
+                                                                   {ImGuiMouseButton_Middle, SliceButton::middle}};
+  for (const auto& [button, is] : kButtons) {
+    if (hovered && button == ImGuiMouseButton_Left && ImGui::IsMouseDoubleClicked(button)) {
+      control_.double_click(at);
+    } else if (hovered && ImGui::IsMouseClicked(button)) {
+      control_.press(at, is);
+    }
+    if (ImGui::IsMouseReleased(button)) control_.release(at, is);
+  }
+  if (hovered && io.MouseWheel != 0) control_.wheel(at, static_cast<double>(io.MouseWheel));
+}
+
+void CutsPanel::one_cut(int cut, const Rehearsal& rehearsal, const SawCut* planned) {
+  const auto n = static_cast<std::size_t>(cut);
+  const ScreenBox box = boxes_[n];
+  if (box.width < 8 || box.height < 8) return;
+  // Letters and lines grow with the cuts, also where the panels' text does not.
+  const float scale = std::max(scale_now(), header_.width / 360);
+  ImGui::SetNextWindowPos({box.x, box.y});
+  ImGui::SetNextWindowSize({box.width, box.height});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, {0, 0, 0, 1});
+  ImGui::Begin(("cut " + std::to_string(cut)).c_str(), nullptr, kFixed | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  const ImVec2 lo = ImGui::GetCursorScreenPos();
+  ImGui::InvisibleButton("picture", {box.width, box.height},
+                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight | ImGuiButtonFlags_MouseButtonMiddle);
+  mouse_over(cut, lo.x, lo.y);
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const SliceView& view = control_.view(cut);
+  const SliceOnScreen on{draw, view, lo, scale};
+  draw->PushClipRect(lo, {lo.x + box.width, lo.y + box.height}, true);
+  if (const auto& drawn = drawn_[n]) {
+    // It may be of a moment ago: moved and zoomed as the cut is now. Of another plane it says nothing.
+    const SliceView& of = drawn->view;
+    if (dot(of.axes().right, view.axes().right) > 0.99 && dot(of.axes().down, view.axes().down) > 0.99) {
+      const auto place = [&](double x, double y) {
+        const auto p = view.pixel(of.world(x, y));
+        return ImVec2{lo.x + static_cast<float>(p[0]) + 0.5F, lo.y + static_cast<float>(p[1]) + 0.5F};
+      };
+      draw->AddImage(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(textures_[n])), place(-0.5, -0.5),
+                     place(of.width - 0.5, of.height - 0.5));
+      for (const DrawnCut::Outline& o : drawn->outlines) {
+        if (o.value >= CutStructure::kRegion) {
+          if (!regions_->shown()) continue;
+          const auto c = region_colour(regions_->all()[static_cast<std::size_t>(o.value - CutStructure::kRegion)].region.forbidden);
+          const ImU32 ink =
+              ImGui::ColorConvertFloat4ToU32({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.9F});
+          for (const CutLine& line : o.lines) on.line(line, ink, 1.2F * scale);
+          continue;
+        }
+        const auto& all = structures_->all();
+        const auto s = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.value == o.value; });
+        if (s == all.end() || s->look == StructureLook::hidden) continue;
+        const auto c = rehearsal.structures()->colour_of(s->value);
+        const ImU32 colour = ImGui::ColorConvertFloat4ToU32(
+            {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), s->look == StructureLook::clear ? 0.55F : 1.0F});
+        for (const CutLine& line : o.lines) on.line(line, colour, 1.6F * scale);
+      }
+    }
+  }
+  if (planned != nullptr) {
+    for (const CutLine& line : section_of(blade_of(*planned), view.through_mm, view.normal())) on.line(line, kPlanned, 1.5F * scale);
+  }
+  for (std::size_t hand = 0; hand < rehearsal.hands(); ++hand) {
+    const TickRecord tick = rehearsal.latest(hand);
+    if ((hand > 0 && tick.tick == 0) || (tick.flags & kPlateInHand) != 0) continue;
+    const Instrument& held = instrument_of(tick.device.tool);
+    const Vec3 at = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+               axis = normalized(from_floats(tick.device.axis));
+    on.line(section_of(held.shaft, at, axis, view.through_mm, view.normal()), kShaft, 1.5F * scale);
+    on.line(section_of(held.head, at, axis, view.through_mm, view.normal()), kHead, 1.5F * scale);
+  }
+  on.cross(control_.cross_mm());
+  on.letters();
+  on.scale_bar();
+  on.title(control_.name(cut));
+  if (const auto& r = control_.ruler()) on.ruler({r->from_mm, r->to_mm});
+  draw->PopClipRect();
+  ImGui::End();
+  ImGui::PopStyleColor();
+  ImGui::PopStyleVar();
+}
+
+void CutsPanel::readout(const Rehearsal& rehearsal) {
+  ImGui::SetNextWindowPos({footer_.x, footer_.y});
+  ImGui::SetNextWindowSize({footer_.width, footer_.height});
+  ImGui::Begin("Under the mouse", nullptr, kFixed);
+  if (const auto p = control_.under_mouse()) {
+    std::string words = place_text(*p) + " mm";
+    if (const auto hu = ct_under_mouse_ ? ct_under_mouse_->at_world(*p) : std::nullopt)
+      words += "   " + std::to_string(std::lround(*hu)) + " HU";
+    ImGui::Text("%s", words.c_str());
+    std::string below = ct_under_mouse_ && !ct_under_mouse_->at_world(*p) ? "no CT value is kept here" : "";
+    if (const StructureMap* const map = rehearsal.structures()) {
+      if (const auto near = map->at(*p); near.structure != 0) {
+        char text[160];
+        std::snprintf(text, sizeof text, near.distance_mm < 0 ? "in %s" : "%s, %.1f mm away", map->name_of(near.structure).c_str(),
+                      near.distance_mm);
+        below += (below.empty() ? "" : ";  ") + std::string(text);
+      }
+    }
+    ImGui::Text("%s", below.c_str());
+  } else {
+    ImGui::TextDisabled("%s mm", place_text(control_.cross_mm()).c_str());
+  }
+  ImGui::End();
+}
+
+void CutsPanel::list_structures(Rehearsal& rehearsal) {
+  const StructureMap& map = *rehearsal.structures();
+  const float scale = scale_now(), width = std::min(300 * scale, middle_.width);
+  ImGui::SetNextWindowPos({header_.x - width, header_.y});
+  ImGui::SetNextWindowSizeConstraints({width, 0}, {width, 0.8F * middle_.height});
+  ImGui::Begin("Structures", &list_open_,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_AlwaysAutoResize);
+  static constexpr const char* kWords[] = {"solid", "clear", "hidden"};
+  const auto take = [&](std::size_t number, StructureLook look) {
+    const StructuresView::One& s = structures_->all()[number];
+    if (s.look == look) return;
+    structures_->show(number, look);
+    note_look(rehearsal, s);
+  };
+  const auto choice = [&](const char* id, std::optional<StructureLook> now, auto&& chosen) {
+    ImGui::PushID(id);
+    for (int l = 0; l < 3; ++l) {
+      ImGui::SameLine(width - (3 - static_cast<float>(l)) * 54 * scale);
+      if (small_button(kWords[l], now == static_cast<StructureLook>(l))) chosen(static_cast<StructureLook>(l));
+    }
+    ImGui::PopID();
+  };
+  ImGui::TextUnformatted("all");
+  choice("all", std::nullopt, [&](StructureLook look) {
+    for (std::size_t s = 0; s < structures_->all().size(); ++s) take(s, look);
+  });
+  for (std::size_t s = 0; s < structures_->all().size(); ++s) {
+    const std::uint8_t value = structures_->all()[s].value;
+    const auto c = map.colour_of(value);
+    const std::string name = map.name_of(value), id = std::to_string(value);
+    ImGui::ColorButton(("##" + id).c_str(), {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 1},
+                       ImGuiColorEditFlags_NoTooltip, {ImGui::GetFontSize(), ImGui::GetFontSize()});
+    ImGui::SameLine();
+    ImGui::TextUnformatted(name.c_str());
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", name.c_str());
+    choice(id.c_str(), structures_->all()[s].look, [&](StructureLook look) { take(s, look); });
+  }
+  ImGui::End();
+}
+
+}  // namespace osteo::app

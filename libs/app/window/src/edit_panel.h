@@ -1,0 +1,32 @@
+// Tools, structures and buttons at the left of the editor. Private to libs/app/window.
+#pragma once
+#include <array>
+#include <string>
+
+#include "edit_control.h"
+
+namespace osteo::inline app {
+
+class EditPanel {
+ public:
+  /// What the window has to do itself.
+  struct Wishes {
+    bool save = false, close = false;
+  };
+  /// Between ImGui::NewFrame and Render. `scale`: of the text, against 96 dots an inch.
+  Wishes draw(EditControl& control, float width, float height, float scale, bool saving);
+  /// Where the slider of the lower threshold was drawn last, for tests: x, y, width, height; no width: it was not.
+  [[nodiscard]] const std::array<float, 4>& threshold_slider() const { return slider_; }
+
+ private:
+  void tools(EditControl& control, float scale);
+  void options(EditControl& control);
+  void structures(EditControl& control, float scale);
+  std::array<char, 65> new_name_{}, name_{};
+  int named_ = -1;  // whose name stands in name_
+  std::array<float, 3> colour_{};
+  int coloured_ = -1;
+  std::array<float, 4> slider_{};
+};
+
+}  // namespace osteo::app

@@ -1,0 +1,102 @@
+// The page of the hand in the panel.
+#include <imgui.h>
+
+#include <cstdio>
+
+#include "hand_desk.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+bool share_slider(const char* name, double& share, double least, const char* help) {
+  auto percent = static_cast<float>(100 * share);
+  const bool changed = ImGui::SliderFloat(name, &percent, static_cast<float>(100 * least), 100, "%.0f %%", ImGuiSliderFlags_AlwaysClamp);
+  if (changed) share = static_cast<double>(percent) / 100;
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", help);
+  return changed;
+}
+
+// By the table, unless that key was given something else.
+std::string key_of(HandFunction function, const HandButtons& buttons) {
+  const ButtonCommand does = command_of(function);
+  for (const Key& key : key_table()) {
+    if (key.command == does.command && key.value == does.value && !buttons.function(key.code)) return key_word(key.code);
+  }
+  return {};
+}
+
+}  // namespace
+
+void HandDesk::draw(RehearsalControl& control, bool show) {
+  if (show) {
+    ImGui::SetNextItemOpen(true);
+    ImGui::SetKeyboardFocusHere();
+  }
+  row_.clear();
+  const bool open = ImGui::CollapsingHeader("Hand and pedals");
+  if (show) ImGui::SetScrollHereY(0);
+  if (!open) {
+    assign_.cancel();
+    return;
+  }
+  PersonValues& v = person_.values;
+  ImGui::TextDisabled("motion of the hand (- =)");
+  for (int n = 1; n <= HandMotion::kFinest; n *= 2) {
+    if (n > 1) ImGui::SameLine();
+    const std::string name = "1:" + std::to_string(n);
+    if (ImGui::RadioButton(name.c_str(), static_cast<int>(v.motion_one_to) == n)) v.motion_one_to = n;
+  }
+  ImGui::PushItemWidth(5 * em());
+  share_slider("at wrist rest", v.wrist_rest, 0.05, "of that motion, while \\ or keypad . is held");
+  share_slider("burr at most", v.burr_share, 0.25, "of its full speed, pedal or button all the way down; keys 9 and 0");
+  ImGui::PopItemWidth();
+  ImGui::Checkbox("left-handed", &v.left_handed);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("the drill is held from the left, the second hand comes from the right");
+  ImGui::Checkbox("mouse buttons change places", &v.mirror_mouse);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("where the system has not done so already");
+  char words[64];
+  std::snprintf(words, sizeof words, "handle tilted %.0f deg", control.handle().tilted_rad() * 57.29577951308232);
+  ImGui::TextUnformatted(words);
+  if (ImGui::Button("as the view holds it (Insert)", {-1, 0})) control.handle().straight();
+  draw_buttons();
+  give(control);
+}
+
+// What each thing is done by. One row for each; a press on it, then the button.
+void HandDesk::draw_buttons() {
+  ImGui::TextDisabled("pedals, buttons, keys");
+  if (assign_.listens()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+    ImGui::TextWrapped("Press what is to do it: %s. Esc: nothing; Delete: none.", words_of(*assign_.listens()).c_str());
+    ImGui::PopStyleColor();
+  } else {
+    ImGui::TextWrapped("%s", said_.empty() ? "Choose a row, then press pedal, button or key." : said_.c_str());
+  }
+  for (std::size_t n = 0; n < EnumNames<HandFunction>::values.size(); ++n) {
+    const auto function = static_cast<HandFunction>(n);
+    // What can be pressed now; of the rest only that there is more.
+    std::string by, all;
+    int absent = 0;
+    const auto add = [](std::string& list, const std::string& name) { list += (list.empty() ? "" : ", ") + name; };
+    if (const std::string key = key_of(function, person_.buttons); !key.empty()) add(by, key);
+    all = by;
+    for (const int b : person_.buttons.buttons_of(function)) {
+      absent += there(b) ? 0 : 1;
+      if (there(b)) add(by, button_name(b));
+      add(all, button_name(b) + (there(b) ? "" : " (not plugged in)"));
+    }
+    if (by.empty()) by = absent > 0 ? std::to_string(absent) + " not plugged in" : "-";
+    const std::string row = words_of(function) + ": " + by + "##" + std::to_string(n);
+    if (ImGui::Selectable(row.c_str(), assign_.listens() == function)) assign_.listen(function);
+    if (ImGui::IsItemFocused()) row_ = words_of(function);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s: %s", words_of(function).c_str(), all.empty() ? "no button" : all.c_str());
+  }
+  if (ImGui::Button("all as usual", {-1, 0})) {
+    person_.buttons = HandButtons::usual();
+    said_ = "pedals, buttons and keys are as usual";
+    assign_.cancel();
+  }
+}
+
+}  // namespace osteo::app

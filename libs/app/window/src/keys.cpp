@@ -1,0 +1,367 @@
+#include "keys.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace osteo::inline app {
+namespace {
+
+// GLFW's numbers for keys without a letter (GLFW 3, stable): letters and digits are their ASCII capitals.
+enum : int {
+  kSpace = 32,
+  kEscape = 256,
+  kEnter = 257,
+  kTab = 258,
+  kBackspace = 259,
+  kInsert = 260,
+  kRight = 262,
+  kLeft = 263,
+  kDown = 264,
+  kUp = 265,
+  kPageUp = 266,
+  kPageDown = 267,
+  kHome = 268,
+  kF1 = 290,
+  kF2 = 291,
+  kF3 = 292,
+  kF4 = 293,
+  kF5 = 294,
+  kF6 = 295,
+  kF7 = 296,
+  kF8 = 297,
+  kF9 = 298,
+  kF10 = 299,
+  kF11 = 300,
+  kKeypad0 = 320,
+  kKeypad2 = 322,
+  kKeypad4 = 324,
+  kKeypad5 = 325,
+  kKeypad6 = 326,
+  kKeypad7 = 327,
+  kKeypad8 = 328,
+  kKeypad9 = 329,
+  kKeypadPoint = 330,
+  kKeypadEnter = 335,
+};
+
+constexpr Key kKeys[] = {
+    {'F', Command::bring},
+    {'U', Command::lift},
+    {kDown, Command::deeper, Key::When::repeated},
+    {kUp, Command::back, Key::When::repeated},
+    {kSpace, Command::drill},
+    {'1', Command::diameter, Key::When::pressed, 1},
+    {'2', Command::diameter, Key::When::pressed, 2},
+    {'3', Command::diameter, Key::When::pressed, 3},
+    {'4', Command::diameter, Key::When::pressed, 4},
+    {'5', Command::diameter, Key::When::pressed, 5},
+    {'6', Command::diameter, Key::When::pressed, 6},
+    {'7', Command::diameter, Key::When::pressed, 7},
+    {'C', Command::cutting},
+    {'D', Command::diamond},
+    {'B', Command::ball},
+    {'Y', Command::cylinder},
+    {'T', Command::taper},
+    {'V', Command::suck, Key::When::held},
+    {'I', Command::wash, Key::When::held},
+    {'X', Command::saw},
+    {'P', Command::pieces},
+    {'L', Command::plates},
+    {'A', Command::turn_left, Key::When::repeated},
+    {'E', Command::turn_right, Key::When::repeated},
+    {kEnter, Command::perform},
+    {kKeypadEnter, Command::perform},
+    {'Z', Command::undo},
+    {kEscape, Command::put_away},
+    {'M', Command::mark},
+    {'S', Command::screenshot},
+    {kF5, Command::save},
+    {'R', Command::reset},
+    {kHome, Command::home},
+    {'N', Command::sound},
+    {kF1, Command::help},
+    {'H', Command::help},
+    {'Q', Command::quit},
+    {'J', Command::quality},
+    {kF3, Command::cut_in_middle},
+    {kF4, Command::cuts_along_tool},
+    {'[', Command::magnify, Key::When::pressed, -1},
+    {']', Command::magnify, Key::When::pressed, 1},
+    {',', Command::focus, Key::When::repeated, -1},
+    {'.', Command::focus, Key::When::repeated, 1},
+    {'/', Command::autofocus},
+    {';', Command::look_there},
+    {'G', Command::look_at_drill},
+    {'O', Command::guide_camera, Key::When::held},
+    {kF6, Command::bookmark, Key::When::pressed, 0},
+    {kF7, Command::bookmark, Key::When::pressed, 1},
+    {kF8, Command::bookmark, Key::When::pressed, 2},
+    {kBackspace, Command::camera_back},
+    {kKeypad4, Command::orbit_left, Key::When::held},
+    {kKeypad6, Command::orbit_right, Key::When::held},
+    {kKeypad8, Command::orbit_up, Key::When::held},
+    {kKeypad2, Command::orbit_down, Key::When::held},
+    {'K', Command::second_hand},
+    {kF2, Command::layout},
+    {kF11, Command::full_screen},
+    {kF10, Command::panel_keys},
+    {kTab, Command::wheel},
+    {kF9, Command::ruler},
+    {'W', Command::before},
+    {kLeft, Command::tilt, Key::When::repeated, 0, kWithAlt},
+    {kRight, Command::tilt, Key::When::repeated, 1, kWithAlt},
+    {kUp, Command::tilt, Key::When::repeated, 2, kWithAlt},
+    {kDown, Command::tilt, Key::When::repeated, 3, kWithAlt},
+    {kPageUp, Command::roll, Key::When::repeated, -1},
+    {kPageDown, Command::roll, Key::When::repeated, 1},
+    {kKeypad7, Command::roll, Key::When::repeated, -1},
+    {kKeypad9, Command::roll, Key::When::repeated, 1},
+    {kInsert, Command::straight},
+    {kKeypad5, Command::straight},
+    {'\'', Command::clutch, Key::When::held},
+    {kKeypad0, Command::clutch, Key::When::held},
+    {'\\', Command::wrist_rest, Key::When::held},
+    {kKeypadPoint, Command::wrist_rest, Key::When::held},
+    {'`', Command::second_mouse, Key::When::held},
+    {'-', Command::motion, Key::When::pressed, -1},
+    {'=', Command::motion, Key::When::pressed, 1},
+    {'9', Command::burr_speed, Key::When::pressed, -1},
+    {'0', Command::burr_speed, Key::When::pressed, 1},
+    {'H', Command::hand_page, Key::When::pressed, 0, kWithAlt},
+    {'T', Command::timeline, Key::When::pressed, 0, kWithCtrl},
+    {kLeft, Command::earlier, Key::When::repeated},
+    {kRight, Command::later, Key::When::repeated},
+    {'H', Command::hints, Key::When::pressed, 0, kWithCtrl},
+    {'N', Command::monitor, Key::When::pressed, 0, kWithCtrl},
+    {'M', Command::mute_monitor, Key::When::pressed, 0, kWithCtrl},
+    {'L', Command::regions, Key::When::pressed, 0, kWithCtrl},
+    {'G', Command::lead, Key::When::pressed, 0, kWithCtrl},
+};
+
+bool has(const std::vector<Command>& list, Command c) {
+  return std::find(list.begin(), list.end(), c) != list.end();
+}
+
+}  // namespace
+
+std::span<const Key> key_table() {
+  return kKeys;
+}
+
+const Key* find_key(int code, int modifiers) {
+  const auto with = [&](int wanted) -> const Key* {
+    const auto* const at =
+        std::find_if(std::begin(kKeys), std::end(kKeys), [&](const Key& k) { return k.code == code && k.with == wanted; });
+    return at == std::end(kKeys) ? nullptr : at;
+  };
+  const Key* const own = with(modifiers & (kWithCtrl | kWithAlt));
+  return own != nullptr ? own : with(0);
+}
+
+std::string key_word(int code) {
+  static const std::pair<int, const char*> kNames[] = {{kSpace, "Space"},
+                                                       {kEscape, "Esc"},
+                                                       {kEnter, "Enter"},
+                                                       {kTab, "Tab"},
+                                                       {kBackspace, "Backspace"},
+                                                       {kInsert, "Insert"},
+                                                       {261, "Delete"},
+                                                       {kRight, "Right"},
+                                                       {kLeft, "Left"},
+                                                       {kDown, "Down"},
+                                                       {kUp, "Up"},
+                                                       {kPageUp, "Page Up"},
+                                                       {kPageDown, "Page Down"},
+                                                       {kHome, "Home"},
+                                                       {269, "End"},
+                                                       {kKeypadPoint, "keypad ."},
+                                                       {331, "keypad /"},
+                                                       {332, "keypad *"},
+                                                       {333, "keypad -"},
+                                                       {334, "keypad +"},
+                                                       {kKeypadEnter, "keypad Enter"},
+                                                       {'\'', "apostrophe"},
+                                                       {'\\', "backslash"},
+                                                       {'`', "left of 1"},
+                                                       {'-', "minus"},
+                                                       {'=', "equals"},
+                                                       {',', "comma"},
+                                                       {'.', "full stop"},
+                                                       {'/', "slash"},
+                                                       {';', "semicolon"}};
+  for (const auto& [known, name] : kNames) {
+    if (known == code) return name;
+  }
+  if (code >= kF1 && code < kF1 + 25) return "F" + std::to_string(code - kF1 + 1);
+  if (code >= kKeypad0 && code < kKeypad0 + 10) return "keypad " + std::to_string(code - kKeypad0);
+  if (code > kSpace && code < 127) return {static_cast<char>(code)};
+  return std::to_string(code);
+}
+
+std::string key_name(Command command) {
+  for (const Key& key : kKeys) {
+    if (key.command == command) return (key.with == kWithCtrl ? "Ctrl-" : key.with == kWithAlt ? "Alt-" : "") + key_word(key.code);
+  }
+  return {};
+}
+
+ButtonCommand command_of(HandFunction function) {
+  switch (function) {
+    case HandFunction::drill:
+      return {Command::pedal, 0};
+    case HandFunction::clutch:
+      return {Command::clutch, 0};
+    case HandFunction::wrist_rest:
+      return {Command::wrist_rest, 0};
+    case HandFunction::second_hand:
+      return {Command::second_mouse, 0};
+    case HandFunction::camera:
+      return {Command::guide_camera, 0};
+    case HandFunction::suck:
+      return {Command::suck, 0};
+    case HandFunction::water:
+      return {Command::wash, 0};
+    case HandFunction::undo:
+      return {Command::undo, 0};
+    case HandFunction::bring:
+      return {Command::bring, 0};
+    case HandFunction::lift:
+      return {Command::lift, 0};
+    case HandFunction::other_burr:
+      return {Command::other_burr, 0};
+    case HandFunction::larger_burr:
+      return {Command::next_burr, 1};
+    case HandFunction::smaller_burr:
+      return {Command::next_burr, -1};
+    case HandFunction::tool_wheel:
+      return {Command::wheel, 0};
+    case HandFunction::faster:
+      return {Command::burr_speed, 1};
+    case HandFunction::slower:
+      return {Command::burr_speed, -1};
+    case HandFunction::finer:
+      return {Command::motion, -1};
+    case HandFunction::coarser:
+      return {Command::motion, 1};
+    case HandFunction::straight:
+      return {Command::straight, 0};
+  }
+  return {Command::pedal, 0};
+}
+
+const std::vector<HelpLine>& help_lines() {
+  using enum Command;
+  static const std::vector<HelpLine> lines = {
+      {"", "the drill", {}},
+      {"move", "moves the drill across the view", {}},
+      {"F", "lifts the drill over to the bone under the mouse, drill off", {bring}},
+      {"U", "lifts the drill out of the bone, drill off", {lift}},
+      {"wheel, Up, Down, Shift-drag", "moves it deeper (away from you) or back", {deeper, back}},
+      {"left button, Space", "drills while held; Space: on and off", {drill}},
+      {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
+      {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
+      {"9, 0", "burr slower, faster: 25 to 100 %", {burr_speed}},
+      {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},
+      {"V, I", "a sucker, or water, beside the burr (with --dust)", {suck, wash}},
+      {"K", "second hand: sucker, water, probe, nothing", {second_hand}},
+      {"Z", "takes back the last stroke, cut, move, plate", {undo}},
+      {"W", "the bone as it was at the beginning, and as it is", {before}},
+      {"", "saw, pieces, plates", {}},
+      {"X", "saw, at the bone under the mouse: drag moves the plane, Shift-drag turns it, wheel: deeper", {saw}},
+      {"P", "pieces: drag moves one, Shift-drag turns it, wheel: deeper", {pieces}},
+      {"L", "plate in the hand, moved like the drill", {plates}},
+      {"A, E", "turn the saw, the piece or the plate", {turn_left, turn_right}},
+      {"Enter", "cut; take apart; fix the plate", {perform}},
+      {"Esc", "back to the drill", {put_away}},
+      {"", "the microscope", {}},
+      {"right drag", "turns the view about its focus; with Shift rolls it", {}},
+      {"middle drag", "shifts the view", {}},
+      {"Ctrl-wheel", "magnifies; with Shift focuses deeper and back", {}},
+      {"[, ]", "magnification, by its steps", {magnify}},
+      {"comma, full stop, /", "focus back, deeper; on the bone in the middle", {focus, autofocus}},
+      {"; (semicolon)", "looks at the bone under the mouse", {look_there}},
+      {"G", "looks at the drill; with Shift along it", {look_at_drill}},
+      {"O", "held, mouse or device move the camera; with Shift turn it", {guide_camera}},
+      {"F6, F7, F8", "go to a kept view; with Shift keep this one", {bookmark}},
+      {"keypad 4 6 8 2", "turn the view", {orbit_left, orbit_right, orbit_up, orbit_down}},
+      {"Backspace", "takes back the camera's last move", {camera_back}},
+      {"Home", "the whole bone, from the left", {home}},
+      {"J", "how the picture is drawn: auto, plain, calm, deep", {quality}},
+      {"", "the cuts", {}},
+      {"wheel, Ctrl-wheel", "scrolls; nearer and farther", {}},
+      {"click, Shift-move", "looks there in all three", {}},
+      {"left drag", "measures", {}},
+      {"right drag, click", "window and level; as they were", {}},
+      {"middle drag", "moves it", {}},
+      {"F3, double click", "it takes the middle, and back", {cut_in_middle}},
+      {"F4", "along the tool, or along the body", {cuts_along_tool}},
+      {"Ctrl-L", "what the procedure wants removed (green) or left (orange)", {regions}},
+      {"", "the hand", {}},
+      {"Alt-right drag, Alt-arrows", "tilts the handle; the burr stays where it is", {tilt}},
+      {"Alt-Shift-right drag, Page Up, Down, keypad 7 9", "rolls it about the line of sight", {roll}},
+      {"Insert, keypad 5", "the handle as the view holds it", {straight}},
+      {"' (apostrophe), keypad 0, mouse 4", "clutch: held, the mouse moves without the drill", {clutch}},
+      {"\\ (backslash), keypad ., mouse 5", "wrist rest: held, the hand moves finely", {wrist_rest}},
+      {"` (left of 1)", "held, the mouse moves the second hand, its left button works", {second_mouse}},
+      {"-, =", "motion of the hand finer or coarser, 1:1 to 1:8", {motion}},
+      {"Alt-H", "hand and pedals in the panel, by keys", {hand_page}},
+      {"", "the session", {}},
+      {"S", "screenshot with its caption into its folder", {screenshot}},
+      {"M", "note pinned to the bone under the mouse; without text: marks this moment", {mark}},
+      {"F9", "ruler: two points on the bone, by clicks", {ruler}},
+      {"F5", "saves it and goes on", {save}},
+      {"R", "asks; saves it, and the bone is whole again", {reset}},
+      {"Q", "saves and ends it, and shows what was done", {quit}},
+      {"Ctrl-T", "then: its course, and the bone as of any time", {timeline}},
+      {"Left, Right", "in it: a second back, on; with Shift ten; Space plays", {earlier, later}},
+      {"", "the window", {}},
+      {"F1, H", "shows this, and hides it", {help}},
+      {"F2", "layout: panel and cuts beside, picture alone, four pictures", {layout}},
+      {"F10", "keys move in the panel: arrows, Space; Esc gives them back", {panel_keys}},
+      {"F11", "full screen, and back", {full_screen}},
+      {"Ctrl +, Ctrl -, Ctrl 0", "size of text and panels; as the monitor has it", {}},
+      {"N", "sound on and off", {sound}},
+      {"Ctrl-H, Ctrl-G", "hints; in a lesson, your hand led or not", {hints, lead}},
+      {"Ctrl-N, Ctrl-M", "nerve monitor, with --monitor; its sound", {monitor, mute_monitor}}};
+  return lines;
+}
+
+void Keyboard::on(int code, Event event, int modifiers) {
+  if (event == Event::released) {
+    std::erase_if(down_, [&](const Down& d) { return d.code == code; });
+    return;
+  }
+  Key key{code, Command::pedal};
+  if (const auto given = bound_ != nullptr ? bound_->function(code) : std::nullopt) {
+    const ButtonCommand does = command_of(*given);
+    key.command = does.command;
+    key.value = does.value;
+  } else if (const Key* const known = find_key(code, modifiers)) {
+    key = *known;
+  } else {
+    return;
+  }
+  const bool shift = (modifiers & kWithShift) != 0;
+  if (event == Event::pressed || key.when == Key::When::repeated) presses_.push_back({key.command, key.value, shift});
+  if (std::none_of(down_.begin(), down_.end(), [&](const Down& d) { return d.code == code; })) down_.push_back({code, key.command});
+  if (!has(since_, key.command)) since_.push_back(key.command);
+}
+
+std::vector<Keyboard::Press> Keyboard::frame(bool ignore) {
+  held_.clear();
+  if (!ignore) {
+    for (const Down& d : down_) held_.push_back(d.command);
+  }
+  for (const Command c : std::exchange(since_, {})) {
+    if (!ignore && !has(held_, c)) held_.push_back(c);
+  }
+  std::vector<Press> presses = std::exchange(presses_, {});
+  if (ignore) presses.clear();
+  return presses;
+}
+
+bool Keyboard::held(Command command) const {
+  return has(held_, command);
+}
+
+}  // namespace osteo::app

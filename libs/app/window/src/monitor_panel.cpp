@@ -1,0 +1,267 @@
+#include "monitor_panel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "monitor_screen.h"
+#include "osteo/core/base/param.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+// In heights of text.
+constexpr float kLeastLaneEm = 1.7F, kLeastEm = 13, kMostEm = 18, kSwitchesEm = 24;
+
+float button_wide(const char* words) {
+  return ImGui::CalcTextSize(words).x + 2 * ImGui::GetStyle().FramePadding.x;
+}
+float box_wide(const char* words) {
+  return ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x + ImGui::CalcTextSize(words).x;
+}
+// In the same row, where it has room for something so wide.
+void beside(float wide) {
+  ImGui::SameLine();
+  if (ImGui::GetContentRegionAvail().x < wide) ImGui::NewLine();
+}
+
+// A lane of a channel: its name and gain at the left, where clicks change the gain.
+ScreenBox lane_head(MonitorScreen& screen, std::size_t channel, const std::string& name, const ScreenBox& lane) {
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const float e = em(), wide = 8.2F * e;
+  fitted_text(draw, {lane.x, lane.y, wide - 0.4F * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.85F, palette::kText, name);
+  ImGui::SetCursorScreenPos({lane.x, lane.y + lane.height / 2});
+  ImGui::PushID(static_cast<int>(channel));
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(e * 0.25F, 0));
+  if (ImGui::SmallButton("-")) screen.change_gain(channel, 1);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("smaller in the picture");
+  ImGui::SameLine(0, e * 0.2F);
+  if (ImGui::SmallButton("+")) screen.change_gain(channel, -1);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("larger in the picture");
+  ImGui::PopStyleVar();
+  ImGui::PopID();
+  const ImVec2 at = ImGui::GetItemRectMax();
+  fitted_text(draw, {at.x + e * 0.3F, lane.y + lane.height / 2, wide - 3 * e, std::min(lane.height / 2, 1.1F * e)}, e * 0.75F,
+              palette::kFaint, std::to_string(screen.gain_uv(channel)) + " uV");
+  return {lane.x + wide, lane.y, lane.width - wide, lane.height};
+}
+
+}  // namespace
+
+void MonitorPanel::draw_sweep(MonitorDesk& desk, float height) {
+  MonitorScreen& screen = desk.screen();
+  const MonitorScreen::View view = screen.view();
+  if (view.labels.empty()) return;
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float wide = ImGui::GetContentRegionAvail().x, lane_high = height / static_cast<float>(view.labels.size());
+  for (std::size_t ch = 0; ch < view.labels.size(); ++ch) {
+    const ScreenBox lane{corner.x, corner.y + static_cast<float>(ch) * lane_high, wide, lane_high - 2};
+    const ScreenBox box = lane_head(screen, ch, view.labels[ch], lane);
+    const float middle = box.y + box.height / 2, half = box.height / 2;
+    const auto gain = static_cast<float>(screen.gain_uv(ch));
+    const auto y_of = [&](float uv) { return middle - std::clamp(uv / gain, -1.0F, 1.0F) * half; };
+    draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
+    for (const float sign : {-1.0F, 1.0F}) {
+      const auto uv = sign * static_cast<float>(view.event_uv);
+      if (std::abs(uv) < gain) draw->AddLine({box.x, y_of(uv)}, {box.right(), y_of(uv)}, im_colour32(palette::kOrange, 0.5F));
+    }
+    // As wide as the screen has pixels: a column is all that falls into it, and reaches to the one before.
+    const auto columns = static_cast<std::size_t>(std::max(1.0F, std::min(box.width, static_cast<float>(MonitorScreen::kBins))));
+    float last_least = 0, last_most = 0;
+    for (std::size_t c = 0; c < columns; ++c) {
+      const std::size_t from = c * MonitorScreen::kBins / columns, to = std::max(from + 1, (c + 1) * MonitorScreen::kBins / columns);
+      float least = view.sweep[ch][from].least_uv, most = view.sweep[ch][from].most_uv;
+      bool gap = false;
+      for (std::size_t b = from; b < to; ++b) {
+        least = std::min(least, view.sweep[ch][b].least_uv);
+        most = std::max(most, view.sweep[ch][b].most_uv);
+        // Behind the place that is written now lies the oldest: a gap between them.
+        gap = gap || (b + MonitorScreen::kBins - view.at) % MonitorScreen::kBins < 8;
+      }
+      const bool over = most >= static_cast<float>(view.event_uv) || least <= -static_cast<float>(view.event_uv);
+      const float x = box.x + (static_cast<float>(c) + 0.5F) * box.width / static_cast<float>(columns);
+      const float joined_least = c > 0 ? std::min(least, last_most) : least, joined_most = c > 0 ? std::max(most, last_least) : most;
+      if (!gap)
+        draw->AddLine({x, y_of(joined_most)}, {x, std::max(y_of(joined_least), y_of(joined_most) + 1)},
+                      im_colour32(over ? palette::kYellow : palette::kGreen), std::max(1.0F, box.width / static_cast<float>(columns)));
+      last_least = least;
+      last_most = most;
+    }
+  }
+  ImGui::SetCursorScreenPos({corner.x, corner.y + height});
+  ImGui::Dummy({1, 1});
+}
+
+void MonitorPanel::draw_answers(MonitorDesk& desk, float height) {
+  MonitorScreen& screen = desk.screen();
+  const MonitorScreen::View view = screen.view();
+  if (view.labels.empty()) return;
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float wide = ImGui::GetContentRegionAvail().x, lane_high = height / static_cast<float>(view.labels.size());
+  for (std::size_t ch = 0; ch < view.labels.size(); ++ch) {
+    const ScreenBox lane{corner.x, corner.y + static_cast<float>(ch) * lane_high, wide, lane_high - 2};
+    const ScreenBox box = lane_head(screen, ch, view.labels[ch], lane);
+    const float middle = box.y + box.height / 2, half = box.height / 2;
+    const auto gain = static_cast<float>(screen.gain_uv(ch));
+    draw->AddRectFilled({box.x, box.y}, {box.right(), box.bottom()}, im_colour32({0.02F, 0.03F, 0.03F}, 0.9F));
+    for (int ms = 5; ms < 20; ms += 5) {
+      const float x = box.x + box.width * static_cast<float>(ms) / 20;
+      draw->AddLine({x, box.y}, {x, box.bottom()}, im_colour32(palette::kRaised));
+      if (ch + 1 == view.labels.size())
+        fitted_text(draw, {x + 2, box.bottom() - em(), 4 * em(), em()}, em() * 0.75F, palette::kFaint, std::to_string(ms) + " ms");
+    }
+    const auto& traces = view.traces[ch];
+    for (std::size_t t = 0; t < traces.size(); ++t) {
+      std::vector<ImVec2> line;
+      for (std::size_t i = 0; i < traces[t].uv.size(); ++i)
+        line.push_back({box.x + box.width * static_cast<float>(i) / MonitorScreen::kTraceSamples,
+                        middle - std::clamp(traces[t].uv[i] / gain, -1.0F, 1.0F) * half});
+      const bool newest = t + 1 == traces.size();
+      draw->AddPolyline(line.data(), static_cast<int>(line.size()),
+                        im_colour32(traces[t].answered ? palette::kYellow : palette::kSkyBlue, newest ? 1 : 0.35F), ImDrawFlags_None,
+                        newest ? 1.6F : 1);
+    }
+  }
+  ImGui::SetCursorScreenPos({corner.x, corner.y + height});
+  ImGui::Dummy({1, 1});
+}
+
+void MonitorPanel::draw_stimulator(MonitorDesk& desk) {
+  const StimulatorSetting now = desk.stimulator();
+  const bool on = now.current_ma > 0;
+  auto ma = static_cast<float>(wanted_.current_ma);
+  ImGui::SetNextItemWidth(std::min(9 * em(), ImGui::GetContentRegionAvail().x));
+  const bool moved = ImGui::SliderFloat("##ma", &ma, static_cast<float>(StimulatorSetting::kLeastMa),
+                                        static_cast<float>(StimulatorSetting::kMostMa), "%.2f mA", ImGuiSliderFlags_Logarithmic);
+  wanted_.current_ma = static_cast<double>(ma);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("current of the stimulator: the tip of the tool is its electrode");
+  const char* const turn = on ? "stimulator on" : "stimulator off";
+  beside(button_wide(turn));
+  if (on) ImGui::PushStyleColor(ImGuiCol_Button, im_colour(palette::kBlue));
+  const bool turned = ImGui::Button(turn);
+  if (on) ImGui::PopStyleColor();
+  const char* const look = now.search ? "looking ..." : "find threshold";
+  beside(button_wide(look));
+  const bool search = ImGui::Button(look);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("twice, half and between, three pulses each, while the tip touches");
+  if (desk.hands() > 1) {
+    beside(box_wide("second hand"));
+    bool second = wanted_.hand == 1;
+    if (ImGui::Checkbox("second hand", &second)) wanted_.hand = second ? 1 : 0;
+  }
+  if (const auto found = desk.screen().threshold_ma()) {
+    beside(10 * em());
+    ImGui::Text("threshold %.2f mA", *found);
+  }
+  if (search) {
+    find_threshold(desk);
+  } else if (turned) {
+    switch_stimulator(desk);
+  } else if (moved && on && !now.search) {
+    desk.stimulate(wanted_);
+  }
+}
+
+void MonitorPanel::switch_stimulator(MonitorDesk& desk) const {
+  if (!desk.stimulates()) return;
+  StimulatorSetting next = wanted_;
+  if (desk.stimulator().current_ma > 0) next.current_ma = 0;
+  desk.stimulate(next);
+}
+
+void MonitorPanel::find_threshold(MonitorDesk& desk) const {
+  if (!desk.stimulates()) return;
+  StimulatorSetting next = wanted_;
+  next.search = true;
+  next.pulses_per_s = 10;
+  desk.stimulate(next);
+}
+
+void MonitorPanel::draw_switches(MonitorDesk& desk) {
+  const float e = em();
+  MonitorScreen& screen = desk.screen();
+  bool frozen = screen.frozen(), muted = desk.sound().muted();
+  // First what has to be seen: it stays in its place.
+  const bool alarm = screen.alarm();
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.6F, at.y + e * 0.5F}, e * 0.45F, alarm ? 8 : 0,
+            alarm ? palette::kVermillion : palette::kFaint);
+  ImGui::Dummy({e * 1.2F, 1});
+  ImGui::SameLine();
+  ImGui::PushStyleColor(ImGuiCol_Text, im_colour(alarm ? palette::kVermillion : palette::kFaint));
+  ImGui::TextUnformatted(alarm ? "activity" : "quiet");
+  ImGui::PopStyleColor();
+  ImGui::SameLine(7 * e);
+  ImGui::TextDisabled("nerve monitor, for practice");
+  if (ImGui::RadioButton("free run", !answers_)) answers_ = false;
+  beside(box_wide("by stimulus"));
+  if (ImGui::RadioButton("by stimulus", answers_)) answers_ = true;
+  beside(box_wide("freeze"));
+  if (ImGui::Checkbox("freeze", &frozen)) screen.freeze(frozen);
+  const char* const mute = own_window_ ? "mute (M)" : "mute (Ctrl-M)";
+  beside(box_wide(mute));
+  if (ImGui::Checkbox(mute, &muted)) desk.sound().mute(muted);
+  if (!own_window_) {
+    beside(button_wide("hide (Ctrl-N)"));
+    if (ImGui::SmallButton("hide (Ctrl-N)")) shown_ = false;
+  }
+  if (desk.stimulates()) draw_stimulator(desk);
+  if (!desk.invitation().empty()) ImGui::TextWrapped("%s", desk.invitation().c_str());
+}
+
+void MonitorPanel::lay_out(RoomLayout& room, float em_pixels, bool there) {
+  box_ = {};
+  if (there && shown_) box_ = take_strip(room, std::clamp(room.view.height * 0.28F, kLeastEm * em_pixels, kMostEm * em_pixels));
+}
+
+void MonitorPanel::draw(MonitorDesk& desk) {
+  if (box_.empty()) return;
+  const float e = em();
+  begin_fixed("monitor", box_, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse);
+  if (desk.wiring().channels.empty()) {
+    ImGui::TextWrapped("The case lists none of the nerves that the monitor knows: prepare it with --structures and --names.");
+    ImGui::End();
+    return;
+  }
+  const auto log = [&](float high) {
+    ImGui::BeginChild("log", {0, high});
+    const std::vector<MonitorScreen::Line> lines = desk.screen().log();
+    for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
+      if (line->alarm) ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kVermillion));
+      ImGui::TextWrapped("%.2f s  %s", line->at_s, line->words.c_str());
+      if (line->alarm) ImGui::PopStyleColor();
+    }
+    ImGui::EndChild();
+  };
+  const auto lanes = [&](float high) {
+    if (answers_) {
+      draw_answers(desk, high);
+    } else {
+      draw_sweep(desk, high);
+    }
+  };
+  // Where it is wide enough the curves have all its height.
+  if (box_.width >= 48 * e) {
+    ImGui::BeginChild("switches", {kSwitchesEm * e, 0}, false, ImGuiWindowFlags_NoScrollbar);
+    draw_switches(desk);
+    log(0);
+    ImGui::EndChild();
+    ImGui::SameLine();
+    ImGui::BeginChild("curves", {0, 0}, false, ImGuiWindowFlags_NoScrollbar);
+    lanes(ImGui::GetContentRegionAvail().y);
+    ImGui::EndChild();
+  } else {
+    draw_switches(desk);
+    const float left = ImGui::GetContentRegionAvail().y, least = kLeastLaneEm * e * static_cast<float>(desk.wiring().channels.size());
+    const float log_high = std::min(left - least, 5 * e);
+    const bool told = log_high > 1.2F * e;
+    lanes(told ? left - log_high - ImGui::GetStyle().ItemSpacing.y : left);
+    if (told) log(0);
+  }
+  ImGui::End();
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,196 @@
+#include <vector>
+
+#include "gamepad.h"
+#include "osteo/simulation/bone/world_mesh.h"
+#include "rehearsal_parts.h"
+
+namespace osteo::inline app {
+
+ScopeMouse RehearsalWindow::mouse() const {
+  const ImGuiIO& io = ImGui::GetIO();
+  const auto [x, y] = unsqueezed(stereo_.params.mode, scope_.area, static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+  return {x,
+          y,
+          static_cast<double>(io.MouseDelta.x),
+          static_cast<double>(io.MouseDelta.y),
+          static_cast<double>(io.MouseWheel),
+          ImGui::IsMouseDown(ImGuiMouseButton_Right),  // its first pixels too: they are not the drill's
+          ImGui::IsMouseDown(ImGuiMouseButton_Middle),
+          io.KeyCtrl,
+          io.KeyShift};
+}
+
+// Where there is no hand to move.
+void RehearsalWindow::camera_by_mouse() {
+  const ImGuiIO& io = ImGui::GetIO();
+  const auto seconds = static_cast<double>(io.DeltaTime);
+  if (cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !io.WantCaptureMouse) scope_.mouse(mouse(), false, seconds);
+  scope_.advance(keyboard_, io.KeyShift, {}, seconds);
+}
+
+void RehearsalWindow::mouse_and_keys() {
+  const ImGuiIO& io = ImGui::GetIO();
+  const bool in_view = cuts_.scene().holds(io.MousePos.x, io.MousePos.y) && !room_.in_front();
+  const auto seconds = static_cast<double>(io.DeltaTime);
+  const CameraDevices devices = actions_.camera ? actions_.camera(scope_.lent()) : CameraDevices{};
+  read_hand();
+  scope_.lend(keyboard_.held(Command::guide_camera));
+  const ScopeMouse m = mouse();
+  bool measured = false;
+  if (in_view && !io.WantCaptureMouse) {
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) measured = room_.click(bone_seen(ray(m.x, m.y)), control_);
+    const bool tilted = !measured && tilt_by_mouse(m);
+    if (!measured && !tilted && !scope_.mouse(m, scope_.lent() && !devices.hand_mm, seconds)) use_mouse(m);
+  }
+  control_.look_from(view_axes());  // the mouse may have turned it
+  const std::optional<Vec3> direction = in_view ? std::optional(ray(m.x, m.y)) : std::nullopt;
+  std::vector<Keyboard::Press> presses = keyboard_.frame(io.WantTextInput || room_.writing());
+  for (const Keyboard::Press& button : room_.take_presses()) presses.push_back(button);
+  for (const Keyboard::Press& press : presses) {
+    do_press(press, direction);
+    if (control_.failure() || ended_ || quit_) return;
+  }
+  scope_.advance(keyboard_, io.KeyShift, devices, seconds);
+  control_.look_from(view_axes());
+  if (const auto said = trial_.advance(scope_.control, seconds, actions_.folder() / "camera-trial.csv")) control_.say(*said);
+  const bool may_drill = in_view && !io.WantCaptureMouse && !measured && !room_.ruler().on() && !room_.before();
+  desk_.take(control_);
+  HandInput hand = desk_.input(control_);
+  hand.seconds = seconds;
+  hand.pressed = ImGui::IsMouseDown(ImGuiMouseButton_Left) && !scope_.lent();
+  hand.on_bone = may_drill;
+  hand.pad = read_gamepad();
+  if (scope_.lent() || room_.before()) hand.drill = 0;
+  control_.hold(hand);
+}
+
+void RehearsalWindow::read_hand() {
+  std::vector<ButtonLevel> levels;
+  read_stick_buttons(levels);
+  for (int n = 3; n < 5; ++n) levels.push_back({button::kMouse + n, ImGui::GetIO().MouseDown[n] ? 1.0 : 0.0});
+  shell_.mirror_mouse = desk_.mirror_mouse();
+  desk_.read(std::move(levels), shell_.attended(), actions_, control_);
+  desk_.give(control_);
+}
+
+bool RehearsalWindow::tilt_by_mouse(const ScopeMouse& m) {
+  constexpr double kRadPerPx = 0.0061;
+  if (!ImGui::GetIO().KeyAlt || !m.right || !control_.tools().in_hand()) return false;
+  if (m.shift) {
+    control_.roll_hand(kRadPerPx * m.dx);
+  } else {
+    control_.tilt_hand(kRadPerPx * m.dx, -kRadPerPx * m.dy);
+  }
+  return true;
+}
+
+void RehearsalWindow::do_press(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
+  // What begins or ends a session shows pictures of its own.
+  const bool long_work = press.command == Command::save || press.command == Command::quit || press.command == Command::perform ||
+                         press.command == Command::before;
+  if (long_work) ImGui::EndFrame();
+  const std::optional<Vec3> bone = press.command == Command::mark ? bone_seen(direction) : std::nullopt;
+  if (press.command == Command::before) {
+    show_before(!room_.before());
+  } else if (!room_.takes(press, control_, bone) && !camera_takes(press, direction) && !control_.command(press, direction)) {
+    command(press.command);
+  }
+  if (long_work) shell_.new_frame();
+}
+
+bool RehearsalWindow::camera_takes(const Keyboard::Press& press, const std::optional<Vec3>& direction) {
+  std::string said;
+  if (!scope_.key(press, scope_scene(), direction, said)) return false;
+  if (!said.empty()) control_.say(said);
+  return true;
+}
+
+std::optional<Vec3> RehearsalWindow::bone_seen(const std::optional<Vec3>& direction) {
+  if (!direction) return std::nullopt;
+  const std::optional<BoneHit> hit = control_.bone_seen(*direction);
+  return hit ? std::optional(hit->at_mm) : std::nullopt;
+}
+
+// The mouse is the hand, or what the hand's tool is moved by.
+void RehearsalWindow::use_mouse(const ScopeMouse& m) {
+  Rehearsal& rehearsal = control_.rehearsal();
+  HandTools& tools = control_.tools();
+  if (!tools.in_hand()) {
+    use_tool(tools, rehearsal, m);
+    if (m.wheel != 0) tools.push(1.0 * m.wheel, rehearsal, view_axes());
+    return;
+  }
+  if (keyboard_.held(Command::second_mouse)) {
+    const Vec3 by = step_of(m, control_.second_mm()).by_mm + view_axes().forward * (0.5 * m.wheel);
+    if (m.dx != 0 || m.dy != 0 || m.wheel != 0) control_.drag_second(by);
+    return;
+  }
+  if (m.shift && ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+    control_.push_hand(0.05 * -m.dy);
+  } else if (m.dx != 0 || m.dy != 0) {
+    control_.drag_hand(step_of(m, control_.goal_mm()));
+  }
+  if (m.wheel != 0) control_.push_hand(0.5 * m.wheel);
+}
+
+// Saw and pieces: what the mouse drags is not the hand.
+void RehearsalWindow::use_tool(HandTools& tools, Rehearsal& rehearsal, const ScopeMouse& m) {
+  if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) tools.pick(rehearsal, view_axes().eye_mm, ray(m.x, m.y));
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left) || (m.dx == 0 && m.dy == 0)) return;
+  const Vec3 at = tools.position_mm();
+  const Vec3 by = step_of(m, at).by_mm;
+  const ViewAxes view = view_axes();
+  tools.drag(dot(by, view.right), dot(by, view.up), m.shift, rehearsal, view);
+}
+
+// What is the window's own.
+void RehearsalWindow::command(Command command) {
+  if (command == Command::screenshot) screenshot_wanted_ = true;
+  if (command == Command::hints) {
+    hints_.turn(!hints_.on());
+    control_.say(hints_.on() ? "hints are given" : "no hints");
+  }
+  if (command == Command::timeline) control_.say("the course of the session is shown when it is over (Q)");
+  if (command == Command::sound) sound_.turn(!sound_.on());
+  if (command == Command::lead) switch_lead();
+  if (command == Command::monitor || command == Command::mute_monitor) monitor_command(command);
+  if (command == Command::quality) {
+    QualityChoice& q = painter_->quality();
+    q.want(static_cast<Quality>((static_cast<int>(q.wish()) + 1) % 4));
+  }
+  if (command == Command::cut_in_middle) cuts_.control().enlarge_or_back();
+  if (command == Command::cuts_along_tool) {
+    const bool along = cuts_.control().planes() == CutsControl::Planes::tool;
+    cuts_.control().take_planes(along ? CutsControl::Planes::body : CutsControl::Planes::tool);
+  }
+  if (command == Command::regions) {
+    if (regions_) {
+      regions_->show(!regions_->shown());
+    } else {
+      control_.say("no regions are planned: --procedure FILE names them");
+    }
+  }
+  if (command == Command::quit) end_session();
+}
+
+// What the pull does is in the samples of who leads, and so recorded; that it was the person's wish is a note.
+void RehearsalWindow::switch_lead() {
+  if (!tutor_.leads || !actions_.lead) return control_.say("nobody leads your hand in this session");
+  if (control_.leading()) return control_.say("the drill is on its way: your hand is let go until it is there");
+  const bool on = !tutor_.guiding;
+  actions_.lead(on);
+  control_.rehearsal().note("lead", on ? R"({"on":true})" : R"({"on":false})");
+  control_.say(on ? "your hand is led" : "your hand is let go");
+}
+
+void RehearsalWindow::monitor_command(Command command) {
+  MonitorDesk* const desk = monitor_desk();
+  if (desk == nullptr) return control_.say("there is no nerve monitor: begin with --monitor");
+  if (command == Command::monitor) monitor_.show(!monitor_.shown());
+  if (command == Command::mute_monitor) {
+    desk->sound().mute(!desk->sound().muted());
+    control_.say(desk->sound().muted() ? "the nerve monitor is muted" : "the nerve monitor is heard");
+  }
+}
+
+}  // namespace osteo::app

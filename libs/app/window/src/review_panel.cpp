@@ -1,0 +1,183 @@
+#include "review_panel.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "state_facts.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+struct WeightLook {
+  Colour colour;
+  int corners;
+};
+WeightLook look_of(ReviewFinding::Weight weight) {
+  switch (weight) {
+    case ReviewFinding::Weight::good:
+      return {palette::kGreen, 0};
+    case ReviewFinding::Weight::note:
+      return {palette::kSkyBlue, 0};
+    case ReviewFinding::Weight::caution:
+      return {palette::kYellow, 3};
+    case ReviewFinding::Weight::serious:
+      return {palette::kVermillion, 8};
+  }
+  return {palette::kText, 0};
+}
+
+// The largest (or the least) value of the samples that a pixel stands for; not a number where none is known.
+float of_pixel(const std::vector<float>& values, std::size_t from, std::size_t to, bool most) {
+  float out = std::nanf("");
+  for (std::size_t n = from; n < std::min(to, values.size()); ++n) {
+    if (std::isnan(values[n])) continue;
+    if (std::isnan(out) || (most ? values[n] > out : values[n] < out)) out = values[n];
+  }
+  return out;
+}
+
+struct Lane {
+  const char* name;
+  float top, height, full;  // `full`: the value that fills it
+};
+
+}  // namespace
+
+void draw_findings(ReviewControl& control) {
+  ImGui::Separator();
+  switch (control.poll()) {
+    case ReviewControl::State::none:
+      return;
+    case ReviewControl::State::making:
+      ImGui::TextDisabled("findings");
+      ImGui::ProgressBar(static_cast<float>(control.progress()), {-1, 0}, "the session is looked through");
+      return;
+    case ReviewControl::State::failed:
+      ImGui::TextDisabled("findings");
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+      ImGui::TextWrapped("! there are none: %s", control.failure().c_str());
+      ImGui::PopStyleColor();
+      return;
+    case ReviewControl::State::ready:
+      break;
+  }
+  const SessionReview& r = control.review();
+  const float e = em();
+  bool shown = control.shown();
+  if (ImGui::Checkbox("course of the session (Ctrl-T)", &shown)) control.show(shown);
+  for (const std::string& s : r.summary) ImGui::TextWrapped("%s", s.c_str());
+  ImGui::TextDisabled(r.findings.empty() ? "nothing was found" : "findings: a click looks there, another goes on");
+  for (std::size_t n = 0; n < r.findings.size(); ++n) {
+    const ReviewFinding& f = r.findings[n];
+    const WeightLook look = look_of(f.weight);
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    const float wide = ImGui::GetContentRegionAvail().x, left = 1.4F * e;
+    const ImVec2 size = ImGui::CalcTextSize(f.text.c_str(), nullptr, false, wide - left);
+    ImGui::PushID(static_cast<int>(n));
+    if (ImGui::Selectable("##finding", control.chosen() == static_cast<int>(n), 0, {wide, size.y})) control.choose(static_cast<int>(n));
+    if (ImGui::IsItemHovered() && !f.why.empty()) {
+      ImGui::BeginTooltip();
+      ImGui::PushTextWrapPos(30 * e);
+      ImGui::TextUnformatted(f.why.c_str());
+      ImGui::PopTextWrapPos();
+      ImGui::EndTooltip();
+    }
+    ImGui::PopID();
+    draw_sign(ImGui::GetWindowDrawList(), {at.x + 0.5F * e, at.y + 0.6F * e}, 0.4F * e, look.corners, look.colour);
+    ImGui::GetWindowDrawList()->AddText(ImGui::GetFont(), e, {at.x + left, at.y}, im_colour32(palette::kText), f.text.c_str(), nullptr,
+                                        wide - left);
+  }
+  for (const std::string& w : r.words) {
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kFaint));
+    ImGui::TextWrapped("%s", w.c_str());
+    ImGui::PopStyleColor();
+  }
+}
+
+void draw_course(const ScreenBox& box, ReviewControl& control) {
+  begin_fixed("course", box, ImGuiWindowFlags_NoScrollbar);
+  const ReviewCourse& course = control.review().course;
+  const float e = em();
+  if (ImGui::Button(control.playing() ? "pause (Space)" : "play (Space)", {8 * e, 0})) control.play(!control.playing());
+  ImGui::SameLine();
+  ImGui::Text("%s of %s", clock_text(control.now_s()).c_str(), clock_text(control.review().player->end_s()).c_str());
+  ImGui::SameLine();
+  if (ImGui::SmallButton("-")) control.change_speed(-1);
+  ImGui::SameLine();
+  ImGui::Text("x%g", control.speed());
+  ImGui::SameLine();
+  if (ImGui::SmallButton("+")) control.change_speed(1);
+  ImGui::SameLine();
+  ImGui::Checkbox("surgeon's view", &control.surgeons_view);
+
+  const ImVec2 at = ImGui::GetCursorScreenPos(), room = ImGui::GetContentRegionAvail();
+  const float names = 6 * e, left = at.x + names, wide = std::max(1.0F, room.x - names), high = std::max(1.0F, room.y);
+  ImDrawList* const draw = ImGui::GetWindowDrawList();
+  const double end_s = std::max(control.review().player->end_s(), 1e-3);
+  const auto x_of = [&](double t_s) { return left + wide * static_cast<float>(std::clamp(t_s / end_s, 0.0, 1.0)); };
+  const float lane = high / 3;
+  const float full_n = of_pixel(course.force_n, 0, course.size(), true) > 2 ? 8.0F : 2.0F;
+  const Lane lanes[] = {{full_n > 2 ? "force, to 8 N" : "force, to 2 N", at.y, lane, full_n},
+                        {"near, from 5 mm", at.y + lane, lane, 5},
+                        {"bone: seen, unseen", at.y + 2 * lane, lane, 0}};
+  for (const Lane& l : lanes) {
+    draw->AddRectFilled({left, l.top + 1}, {left + wide, l.top + l.height - 1}, im_colour32(palette::kRaised));
+    fitted_text(draw, {at.x, l.top, names - 0.5F * e, l.height}, 0.85F * e, palette::kFaint, l.name);
+  }
+  float most_mm3 = 0;
+  for (std::size_t n = 0; n < course.size(); ++n) most_mm3 = std::max(most_mm3, course.seen_mm3[n] + course.hidden_mm3[n]);
+  const auto samples = static_cast<double>(course.size());
+  for (int px = 0; px < static_cast<int>(wide); ++px) {
+    const auto sample = [&](int p) {
+      return static_cast<std::size_t>(std::min(samples, std::floor(p / static_cast<double>(wide) * end_s * ReviewCourse::kRateHz)));
+    };
+    const std::size_t from = sample(px), to = std::max(from + 1, sample(px + 1));
+    const float x = left + static_cast<float>(px);
+    const auto bar = [&](const Lane& l, float value, float full, Colour colour, float begin = 0) {
+      const float share = std::min(value / full, 1.0F), first = std::min(begin / full, 1.0F);
+      if (share <= first) return;
+      const float bottom = l.top + l.height - 1, tall = l.height - 2;
+      draw->AddRectFilled({x, bottom - share * tall}, {x + 1, bottom - first * tall}, im_colour32(colour));
+    };
+    if (const float f = of_pixel(course.force_n, from, to, true); f > 0) bar(lanes[0], f, lanes[0].full, palette::kSkyBlue);
+    // The nearer, the higher.
+    if (const float d = of_pixel(course.distance_mm, from, to, false); d < lanes[1].full)
+      bar(lanes[1], lanes[1].full - std::max(d, 0.0F), lanes[1].full, d < 0.5F ? palette::kVermillion : palette::kYellow);
+    const float hidden = of_pixel(course.hidden_mm3, from, to, true), seen = of_pixel(course.seen_mm3, from, to, true);
+    if (most_mm3 > 0) {
+      const float below = std::isnan(hidden) ? 0 : hidden;
+      bar(lanes[2], below, most_mm3, palette::kOrange);
+      if (!std::isnan(seen)) bar(lanes[2], below + seen, most_mm3, palette::kGreen, below);
+    }
+  }
+  for (const ReviewCourse::Event& event : course.events)
+    draw->AddLine({x_of(event.t_s), at.y}, {x_of(event.t_s), at.y + high},
+                  im_colour32(event.grave ? palette::kVermillion : palette::kFaint, event.grave ? 1.0F : 0.5F));
+  if (control.chosen() >= 0) {
+    for (const double t : control.review().findings[static_cast<std::size_t>(control.chosen())].times_s)
+      draw->AddTriangleFilled({x_of(t) - 0.3F * e, at.y}, {x_of(t) + 0.3F * e, at.y}, {x_of(t), at.y + 0.5F * e},
+                              im_colour32(palette::kText));
+  }
+  const float now = x_of(control.now_s());
+  draw->AddLine({now, at.y}, {now, at.y + high}, im_colour32(palette::kText), 2);
+  ImGui::SetCursorScreenPos({left, at.y});
+  ImGui::InvisibleButton("time", {wide, high});
+  const double under_s = (static_cast<double>(ImGui::GetIO().MousePos.x) - static_cast<double>(left)) / static_cast<double>(wide) * end_s;
+  if (ImGui::IsItemActive()) {
+    control.play(false);
+    control.go_to(under_s);
+  }
+  if (ImGui::IsItemHovered()) {
+    std::string said = clock_text(std::clamp(under_s, 0.0, end_s));
+    for (const ReviewCourse::Event& event : course.events) {
+      if (std::abs(x_of(event.t_s) - ImGui::GetIO().MousePos.x) < 3) said += "\n" + event.what;
+    }
+    ImGui::SetTooltip("%s", said.c_str());
+  }
+  ImGui::End();
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,16 @@
+// The findings and the course of a session that is over, drawn. Private to libs/app/window; ImGui, no GL.
+#pragma once
+#include "review_control.h"
+#include "room_layout.h"
+
+namespace osteo::inline app {
+
+/// Height of the course along the lower edge of the picture, in heights of text.
+inline constexpr float kCourseEm = 9;
+
+/// Into the current window: how far it is made, or the findings; a click looks at one.
+void draw_findings(ReviewControl& control);
+/// In a box: time, play and speed; force, distance, bone seen and unseen, events; a click or a drag goes there.
+void draw_course(const ScreenBox& box, ReviewControl& control);
+
+}  // namespace osteo::app

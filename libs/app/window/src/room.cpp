@@ -1,0 +1,455 @@
+#include "room.h"
+
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "settings_panel.h"
+#include "sound_panel.h"
+#include "status_panel.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+Layout layout_named(const std::string& name) {
+  for (const Layout l : {Layout::operate, Layout::plan}) {
+    if (EnumNames<Layout>::values[static_cast<std::size_t>(l)] == name) return l;
+  }
+  return Layout::beside;
+}
+
+}  // namespace
+
+Room::Room(WindowShell& shell, PersonSettings& person) : shell_(shell), person_(person), wanted_(layout_named(person.values.layout)) {
+  lay_out(false, 0);
+}
+
+const RoomLayout& Room::lay_out(bool over, float column_width) {
+  layout_ = osteo::lay_out(over ? Layout::review : wanted_, shell_.width(), shell_.height(), static_cast<float>(shell_.em_pixels()),
+                           column_width);
+  return layout_;
+}
+
+void Room::renew() {
+  notes_.clear();
+  ruler_.turn(false);
+  steps_.renew();
+  before_ = asking_ = false;
+  writing_.reset();
+  wheel_.close();
+}
+
+void Room::key(int code) {
+  if (!writing_) return;
+  const Key* const known = find_key(code);
+  if (known == nullptr) return;
+  if (known->command == Command::perform) note_answer_ = 1;
+  if (known->command == Command::put_away) note_answer_ = -1;
+}
+
+std::vector<Keyboard::Press> Room::take_presses() {
+  return std::exchange(pressed_.presses, {});
+}
+
+bool Room::holds(Command command) const {
+  return std::find(pressed_.held.begin(), pressed_.held.end(), command) != pressed_.held.end();
+}
+
+void Room::answer(int answer, RehearsalControl& control) {
+  if (answer == 0) return;
+  asking_ = false;
+  if (answer > 0) control.reset();
+}
+
+bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone) {
+  const Command c = press.command;
+  if (asking_) {
+    answer(c == Command::perform ? 1 : c == Command::put_away ? -1 : 0, control);
+    return true;
+  }
+  if (keys_in_panel_) {
+    keys_in_panel_ = c != Command::put_away && c != Command::panel_keys;
+    // Arrows, Space and Enter are the panel's; other keys go on.
+    if (c == Command::put_away || c == Command::panel_keys || c == Command::deeper || c == Command::back || c == Command::drill ||
+        c == Command::perform)
+      return true;
+  }
+  if (wheel_.open()) {
+    const bool takes_it = c == Command::wheel || c == Command::perform;
+    if (c == Command::deeper || c == Command::back) {
+      wheel_.turn(c == Command::deeper ? 1 : -1);
+      return true;
+    }
+    wheel_.close();
+    if (takes_it && wheel_.chosen() >= 0) {
+      const Command chosen = wheel_items()[static_cast<std::size_t>(wheel_.chosen())].command;
+      // A burr is for the drill.
+      const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates && chosen != Command::put_away;
+      if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
+      pressed_.press(chosen);
+    }
+    return takes_it || c == Command::put_away;
+  }
+  switch (c) {
+    case Command::help:
+      help_.show(!help_.open());
+      return true;
+    case Command::earlier:
+    case Command::later:
+      if (!help_.open()) return false;
+      help_.turn(c == Command::later ? 1 : -1);
+      return true;
+    case Command::layout:
+      wanted_ = next_layout(wanted_);
+      person_.values.layout = EnumNames<Layout>::values[static_cast<std::size_t>(wanted_)];
+      if (lay_out(false, 0).why.empty()) {
+        control.say("layout: " + person_.values.layout);
+      } else {
+        control.say(layout_.why);
+      }
+      return true;
+    case Command::full_screen:
+      shell_.toggle_full_screen();
+      person_.values.full_screen = shell_.full_screen();
+      return true;
+    case Command::hand_page:
+    case Command::panel_keys:
+      keys_in_panel_ = true;
+      if (layout_.panel.empty() && (layout_.tray.empty() || c == Command::hand_page)) keys_in_panel_ = false;
+      if (c == Command::hand_page) {
+        if (!keys_in_panel_) control.say("the panel is folded away: " + key_name(Command::layout) + " brings it");
+        hand_page_ = keys_in_panel_;
+      }
+      if (keys_in_panel_) control.say("keys move in the panel: arrows, Space; Esc gives them back");
+      return true;
+    case Command::wheel: {
+      const ImVec2 m = ImGui::GetIO().MousePos;
+      const float edge = ToolWheel::kOuterEm * em();
+      const ScreenBox& v = layout_.view;
+      const bool inside = v.holds(m.x, m.y);
+      const auto kept = [&](float at, float lo, float length) {
+        return length < 2 * edge ? lo + length / 2 : std::clamp(at, lo + edge, lo + length - edge);
+      };
+      wheel_.show(inside ? kept(m.x, v.x, v.width) : v.x + v.width / 2, inside ? kept(m.y, v.y, v.height) : v.y + v.height / 2);
+      return true;
+    }
+    case Command::ruler:
+      ruler_.turn(!ruler_.on());
+      control.say(ruler_.on() ? "ruler: click two points on the bone" : "ruler put away");
+      return true;
+    case Command::mark:
+      // Where the mouse is; a button in the panel: where the burr is.
+      writing_ = bone ? *bone : from_floats(control.rehearsal().latest().device.position_mm);
+      note_text_.clear();
+      note_answer_ = 0;
+      write_focus_ = true;
+      return true;
+    case Command::reset:
+      asking_ = true;
+      return true;
+    case Command::undo:
+      undone_ = true;
+      return false;
+    case Command::put_away:
+      if (help_.open()) {
+        help_.show(false);
+        return true;
+      }
+      if (ruler_.on()) {
+        ruler_.turn(false);
+        return true;
+      }
+      return false;
+    default:
+      return false;
+  }
+}
+
+bool Room::click(std::optional<Vec3> bone, RehearsalControl& control) {
+  if (!ruler_.on()) return false;
+  if (!bone) {
+    control.say("no bone under the mouse");
+    return true;
+  }
+  if (const auto note = ruler_.click(*bone)) {
+    control.rehearsal().note("ruler", *note);
+    char text[48];
+    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
+    control.say(text);
+  }
+  return true;
+}
+
+HandFacts Room::hand_facts(const RehearsalControl& control, const SoundOut& sound, std::size_t undo_steps) const {
+  HandFacts f;
+  f.burr = control.tool();
+  f.tool = static_cast<int>(control.tools().tool());
+  f.saw = control.tools().saw_in_hand();
+  f.latched = control.latched();
+  f.sucking = control.sucking();
+  f.washing = control.washing();
+  f.sound = sound.on();
+  f.before = before_;
+  f.ruler = ruler_.on();
+  f.second_hand = control.rehearsal().hands() > 1;
+  f.undo_steps = undo_steps;
+  return f;
+}
+
+void Room::see(const RoomScene& scene) {
+  StepFacts facts;
+  std::uint64_t undone = 0;
+  Rehearsal& rehearsal = scene.control.rehearsal();
+  facts.removed_mm3 = rehearsal.removed_mm3();
+  rehearsal.look([&](const World& world, SceneReaders& readers) {
+    facts.sawn_mm3 = readers.tools.sawn_mm3();
+    facts.undo_steps = world.undo_steps();
+    undone = readers.tools.undone();
+    facts.fixtures = world.fixtures().size();
+    facts.dust = readers.dust != nullptr;
+    if (facts.dust) facts.sucked_mm3 = readers.dust->dust().totals().sucked_mm3;
+  });
+  // Asked for, and then done. Not told by the steps there are: a burr that runs out in bone given back makes another at once.
+  facts.undone = undone_ && undone > times_undone_;
+  times_undone_ = undone;
+  if (facts.undone) {
+    undone_ = false;
+    scene.control.say("taken back");
+  }
+  undo_steps_ = facts.undo_steps;
+  facts.magnification = scene.magnification;
+  steps_.see(facts);
+}
+
+void Room::draw(const RoomScene& scene) {
+  ImGuiIO& io = ImGui::GetIO();
+  // ImGui moves its own cursor only while the keys are the panel's.
+  if (keys_in_panel_) {
+    io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
+  } else {
+    io.ConfigFlags &= ~ImGuiConfigFlags_NavEnableKeyboard;
+  }
+  see(scene);
+  pressed_.held.clear();
+  RehearsalControl& control = scene.control;
+  const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
+  if (keys_in_panel_ && !ImGui::IsAnyItemActive() && !io.NavVisible) ImGui::SetNextWindowFocus();
+  if (!layout_.panel.empty()) draw_panel(scene);
+  if (!layout_.tray.empty()) draw_tray(layout_.tray, hand, pressed_);
+  draw_state(layout_.state, state_facts(control.rehearsal(), scene.tick, scene.warmth ? &*scene.warmth : nullptr), control.told());
+  draw_marks(scene);
+  if (writing_) draw_note_field(control);
+  help_.draw(shell_.width(), shell_.height(), [&] { draw_first_steps(steps_, true); });
+  if (wheel_.open()) {
+    const float e = em();
+    if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) wheel_.point((io.MousePos.x - wheel_.x()) / e, (io.MousePos.y - wheel_.y()) / e);
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed_.press(Command::wheel);
+    draw_wheel(wheel_);
+  }
+  if (asking_) {
+    // As if it were a key, at the next frame: what the answer begins shows pictures of its own.
+    const int said = draw_question(shell_.width(), shell_.height(), "Bone whole again?",
+                                   "This session is saved and ends. Another one begins with the bone as the case has it.", "whole again");
+    if (said != 0) pressed_.press(said > 0 ? Command::perform : Command::put_away);
+  }
+}
+
+void Room::draw_panel(const RoomScene& scene) {
+  RehearsalControl& control = scene.control;
+  Rehearsal& rehearsal = control.rehearsal();
+  const HandFacts hand = hand_facts(control, scene.sound, undo_steps_);
+  begin_fixed("panel", layout_.panel, ImGuiWindowFlags_NoScrollbar);
+  // What ends a session stays in its place at the bottom, apart from all else.
+  const float apart = 3 * ImGui::GetFrameHeightWithSpacing() + ImGui::GetStyle().ItemSpacing.y + 2;
+  ImGui::BeginChild("all", {0, std::max(4 * em(), ImGui::GetContentRegionAvail().y - apart)});
+  ImGui::TextDisabled("burr");
+  draw_burr(hand, pressed_);
+  ImGui::Separator();
+  ImGui::TextDisabled("what to do");
+  draw_deeds(hand, pressed_);
+  ImGui::Separator();
+  if (person_.values.first_steps && steps_.next() >= 0) {
+    draw_first_steps(steps_, false);
+    ImGui::Separator();
+  }
+  scene.draw_camera();
+  ImGui::Separator();
+  ImGui::TextDisabled("in the hand");
+  scene.draw_tools();
+  ImGui::Separator();
+  draw_sound(scene.sound);
+  if (scene.draw_hand) scene.draw_hand(std::exchange(hand_page_, false));
+  draw_settings(rehearsal);
+  draw_posture(rehearsal);
+  draw_tissue(rehearsal);
+  if (ImGui::CollapsingHeader("Case and machine")) {
+    draw_approval(scene.machine.approval, scene.machine.approval_ended);
+    if (scene.machine.scan != nullptr) draw_scan(*scene.machine.scan);
+    ImGui::TextWrapped("hand: %s", scene.machine.device.c_str());
+    ImGui::TextWrapped("%s", rehearsal.realtime() ? "real-time priority: yes"
+                                                  : "real-time priority: REFUSED. The force may stutter: allow rtprio in limits.conf.");
+    ImGui::Text("servo %.0f us a tick, late %.0f us", static_cast<double>(scene.tick.work_us), static_cast<double>(scene.tick.lateness_us));
+    ImGui::Text("%.2f of %.2f M triangles", scene.machine.drawn_millions, scene.machine.triangles_millions);
+    ImGui::TextWrapped("%s", scene.machine.pictures.c_str());
+    ImGui::Checkbox("list of first steps", &person_.values.first_steps);
+    ImGui::Checkbox("remember cases", &person_.values.remember_cases);
+  }
+  ImGui::EndChild();
+  draw_apart(pressed_);
+  ImGui::End();
+}
+
+void Room::draw_note_field(RehearsalControl& control) {
+  const float e = em(), wide = std::min(layout_.view.width - e, 26 * e);
+  ImGui::SetNextWindowPos({layout_.view.x + (layout_.view.width - wide) / 2, layout_.view.y + e});
+  ImGui::SetNextWindowSize({wide, 0});
+  ImGui::Begin("Note (without names)", nullptr, ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
+  if (write_focus_) ImGui::SetKeyboardFocusHere();
+  write_focus_ = false;
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputText("##note", &note_text_);
+  ImGui::TextDisabled("Enter keeps it; empty: marks this moment; Esc: nothing");
+  ImGui::End();
+  const int answer = std::exchange(note_answer_, 0);
+  if (answer > 0) {
+    if (const auto note = notes_.pin(*writing_, note_text_)) {
+      control.rehearsal().note("note", *note);
+      control.say("note " + std::to_string(notes_.all().back().number) + " is pinned");
+    } else {
+      control.rehearsal().note("mark", "{}");
+      control.say("marked");
+    }
+  }
+  if (answer != 0) writing_.reset();
+}
+
+void Room::draw_marks(const RoomScene& scene) {
+  ImDrawList* const draw = ImGui::GetBackgroundDrawList();
+  const float e = em();
+  const ScreenBox& v = layout_.view;
+  draw->PushClipRect({v.x, v.y}, {v.right(), v.bottom()});
+  const auto words = [&](float x, float y, const std::string& text, Colour colour) {
+    const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+    x = std::clamp(x, v.x, std::max(v.x, v.right() - size.x - e / 2));
+    y = std::clamp(y, v.y, std::max(v.y, v.bottom() - size.y));
+    draw->AddRectFilled({x - e / 4, y}, {x + size.x + e / 4, y + size.y}, im_colour32(palette::kGround, 0.8F));
+    draw->AddText({x, y}, im_colour32(colour), text.c_str());
+  };
+  for (const PinnedNote& note : notes_.all()) {
+    const auto at = scene.project(note.at_mm);
+    if (!at) continue;
+    const float x = (*at)[0], y = (*at)[1];
+    draw->AddLine({x, y}, {x, y - 2 * e}, im_colour32(palette::kYellow), e / 8);
+    draw->AddRectFilled({x, y - 2 * e}, {x + 1.4F * e, y - e}, im_colour32(palette::kYellow));
+    const std::string number = std::to_string(note.number);
+    draw->AddText({x + 0.35F * e, y - 2 * e}, IM_COL32(0, 0, 0, 255), number.c_str());
+    words(x + 1.7F * e, y - 2 * e, note.text.size() > 40 ? note.text.substr(0, 40) + "..." : note.text, palette::kText);
+  }
+  std::vector<std::array<float, 2>> ends;
+  for (const Vec3 p : ruler_.points_mm()) {
+    if (const auto at = scene.project(p)) {
+      ends.push_back(*at);
+      draw->AddCircle({(*at)[0], (*at)[1]}, e * 0.35F, im_colour32(palette::kSkyBlue), 16, e / 8);
+    }
+  }
+  if (ends.size() == 2 && ruler_.length_mm()) {
+    draw->AddLine({ends[0][0], ends[0][1]}, {ends[1][0], ends[1][1]}, im_colour32(palette::kSkyBlue), e / 8);
+    char text[48];
+    std::snprintf(text, sizeof text, "%.1f mm", *ruler_.length_mm());
+    words((ends[0][0] + ends[1][0]) / 2 + e / 2, (ends[0][1] + ends[1][1]) / 2, text, palette::kSkyBlue);
+  }
+  if (before_) words(v.x + e, v.y + e / 2, "AS IT WAS AT THE BEGINNING (W goes back)", palette::kYellow);
+  draw->PopClipRect();
+}
+
+void Room::draw_caption(const RoomScene& scene) {
+  ImDrawList* const draw = ImGui::GetForegroundDrawList();
+  const float e = em();
+  const ScreenBox& v = layout_.view;
+  const double bar_mm = scale_bar_mm(scene.pixels_per_mm, static_cast<double>(v.width) / 4);
+  const StateFacts state = state_of_tick(scene.tick, nullptr, scene.control.rehearsal().rate_hz());
+  char text[200];
+  std::snprintf(text, sizeof text, "case %s, %s, %s, %.4g mm", scene.machine.case_hash.substr(0, 8).c_str(), state.tool.c_str(),
+                state.time.c_str(), bar_mm);
+  const float bar = static_cast<float>(bar_mm * scene.pixels_per_mm), y = v.bottom() - 2 * e;
+  draw->AddRectFilled({v.x, y}, {v.right(), v.bottom()}, im_colour32(palette::kGround, 0.85F));
+  const float x = v.right() - bar - e;
+  draw->AddRectFilled({x, y + e * 0.8F}, {x + bar, y + e * 1.2F}, im_colour32(palette::kText));
+  fitted_text(draw, {v.x + e / 2, y, v.width - bar - 2.5F * e, 2 * e}, e, palette::kText, text);
+}
+
+EndChoice Room::end_choice(Command command) {
+  switch (command) {
+    case Command::reset:
+      return EndChoice::again;
+    case Command::save:
+      return EndChoice::resume;
+    case Command::home:
+      return EndChoice::another;
+    case Command::quit:
+      return EndChoice::close;
+    default:
+      return EndChoice::none;
+  }
+}
+
+EndChoice Room::draw_end(const EndFacts& facts, const std::function<void()>& findings) {
+  ImGuiIO& io = ImGui::GetIO();
+  io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
+  begin_fixed("end", layout_.page);
+  const float e = em();
+  fitted_text(ImGui::GetWindowDrawList(),
+              {ImGui::GetCursorScreenPos().x, ImGui::GetCursorScreenPos().y, layout_.page.width - 2 * e, 1.6F * e}, 1.6F * e,
+              palette::kText, facts.past ? "A session, looked at again" : "The session is over, and saved");
+  ImGui::Dummy({0, 1.8F * e});
+  EndChoice choice = EndChoice::none;
+  const auto button = [&](const char* words, EndChoice of) {
+    if (ImGui::Button(words, {ImGui::GetContentRegionAvail().x, 0})) choice = of;
+  };
+  if (!facts.past) {
+    button("again, from the whole bone (R)", EndChoice::again);
+    button("go on from here (F5)", EndChoice::resume);
+  }
+  button("another case (Home)", EndChoice::another);
+  button("close (Q)", EndChoice::close);
+  findings();
+  ImGui::Separator();
+  if (ImGui::BeginTable("done", 2)) {
+    ImGui::TableSetupColumn("what", ImGuiTableColumnFlags_WidthStretch, 0.45F);
+    ImGui::TableSetupColumn("value", ImGuiTableColumnFlags_WidthStretch, 0.55F);
+    for (const EndLine& line : facts.lines) {
+      ImGui::TableNextRow();
+      ImGui::TableSetColumnIndex(0);
+      ImGui::TextWrapped("%s", line.what.c_str());
+      ImGui::TableSetColumnIndex(1);
+      const NearnessLook& look = look_of(line.nearness);
+      const bool plain = line.nearness == Nearness::unknown;
+      if (!plain) {
+        const ImVec2 at = ImGui::GetCursorScreenPos();
+        draw_sign(ImGui::GetWindowDrawList(), {at.x + e * 0.5F, at.y + e * 0.5F}, e * 0.4F, look.corners, look.colour);
+        ImGui::SetCursorPosX(ImGui::GetCursorPosX() + 1.2F * e);
+      }
+      ImGui::PushStyleColor(ImGuiCol_Text, im_colour(plain ? palette::kText : look.colour));
+      ImGui::TextWrapped("%s", line.value.c_str());
+      ImGui::PopStyleColor();
+    }
+    ImGui::EndTable();
+  }
+  ImGui::Separator();
+  ImGui::TextDisabled("files");
+  ImGui::TextWrapped("%s", facts.folder.string().c_str());
+  ImGui::TextWrapped("summary.json has the numbers, stream.oss every tick: osteo replay SESSION");
+  for (const std::string& w : facts.warnings) {
+    ImGui::PushStyleColor(ImGuiCol_Text, im_colour(palette::kYellow));
+    ImGui::TextWrapped("! %s", w.c_str());
+    ImGui::PopStyleColor();
+  }
+  ImGui::End();
+  return choice;
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,120 @@
+// The room around the bone: layouts, panels, tray, wheel, help, questions, ruler, notes, first steps, the page at the end. Private to
+// libs/app/window; ImGui, no VTK and no GL: what it draws on the bone it projects itself.
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "help_page.h"
+#include "marks.h"
+#include "osteo/app/window/person_settings.h"
+#include "osteo/app/window/sound_out.h"
+#include "osteo/app/window/window_shell.h"
+#include "rehearsal_control.h"
+#include "room_panels.h"
+#include "steps.h"
+#include "work_done.h"
+
+namespace osteo::inline app {
+
+/// What of the machine and the case there is to say.
+struct MachineFacts {
+  std::string device;
+  double drawn_millions = 0, triangles_millions = 0;
+  const VerdictSummary* scan = nullptr;
+  std::string approval, case_hash;
+  std::string pictures;  ///< how they are drawn and what they take
+  bool approval_ended = false;
+};
+
+/// A rehearsal that runs, and how it is seen now.
+struct RoomScene {
+  RehearsalControl& control;
+  SoundOut& sound;
+  TickRecord tick;
+  MachineFacts machine;
+  double pixels_per_mm = 1;  ///< where one looks at
+  double magnification = 1;
+  /// A point of the world in pixels of the window; nothing behind the eye.
+  std::function<std::optional<std::array<float, 2>>(Vec3)> project;
+  std::function<void()> draw_camera;  ///< the microscope: into the panel
+  std::function<void()> draw_tools;   ///< saw, pieces, plates: into the panel
+  /// What is chosen for the hand: into the panel. `show`: opened, and the keys' cursor on it.
+  std::function<void(bool show)> draw_hand;
+  std::optional<WarmthNow> warmth;  ///< where the scene has heat
+};
+
+enum class EndChoice { none, again, resume, another, close };
+
+class Room {
+ public:
+  Room(WindowShell& shell, PersonSettings& person);
+
+  /// For the window as it is now; `over`: the session has ended; `column_width`: see lay_out().
+  const RoomLayout& lay_out(bool over, float column_width);
+  [[nodiscard]] const RoomLayout& layout() const { return layout_; }
+  [[nodiscard]] Layout wanted() const { return wanted_; }
+  /// Mouse and keys are for something in front of the bone.
+  [[nodiscard]] bool in_front() const { return asking_ || wheel_.open() || writing_.has_value() || help_.open(); }
+  [[nodiscard]] const HelpPage& help() const { return help_; }
+  [[nodiscard]] bool asking() const { return asking_; }
+  [[nodiscard]] bool wheel_open() const { return wheel_.open(); }
+  [[nodiscard]] bool keys_in_panel() const { return keys_in_panel_; }
+  [[nodiscard]] bool before() const { return before_; }
+  void set_before(bool on) { before_ = on; }
+  [[nodiscard]] const Ruler& ruler() const { return ruler_; }
+  [[nodiscard]] const PinnedNotes& notes() const { return notes_; }
+  [[nodiscard]] const FirstSteps& steps() const { return steps_; }
+  [[nodiscard]] bool writing() const { return writing_.has_value(); }
+
+  /// Another session has begun.
+  void renew();
+  /// Each key as it is pressed, as GLFW numbers it: a note is finished by one that may be over before the next picture, which ImGui misses.
+  void key(int code);
+  /// Presses of buttons since the last call, as if they were keys.
+  [[nodiscard]] std::vector<Keyboard::Press> take_presses();
+  /// A button that does it is held down.
+  [[nodiscard]] bool holds(Command command) const;
+  /// True when it was for the room. `bone`: under the mouse, in the view.
+  bool takes(const Keyboard::Press& press, RehearsalControl& control, const std::optional<Vec3>& bone);
+  /// A click on the bone; true when it was a point of the ruler.
+  bool click(std::optional<Vec3> bone, RehearsalControl& control);
+
+  /// Between ImGui::NewFrame and Render.
+  void draw(const RoomScene& scene);
+  /// A caption over the picture, in the frame of a screenshot.
+  void draw_caption(const RoomScene& scene);
+  /// In review. `findings`: drawn into the page.
+  [[nodiscard]] EndChoice draw_end(const EndFacts& facts, const std::function<void()>& findings);
+  /// What a key means on that page.
+  [[nodiscard]] static EndChoice end_choice(Command command);
+
+ private:
+  void draw_panel(const RoomScene& scene);
+  void draw_marks(const RoomScene& scene);
+  void draw_note_field(RehearsalControl& control);
+  void answer(int answer, RehearsalControl& control);
+  void see(const RoomScene& scene);
+  [[nodiscard]] HandFacts hand_facts(const RehearsalControl& control, const SoundOut& sound, std::size_t undo_steps) const;
+
+  WindowShell& shell_;
+  PersonSettings& person_;
+  Layout wanted_ = Layout::beside;
+  RoomLayout layout_;
+  Pressed pressed_;
+  ToolWheel wheel_;
+  FirstSteps steps_;
+  Ruler ruler_;
+  PinnedNotes notes_;
+  HelpPage help_;
+  bool asking_ = false, keys_in_panel_ = false, before_ = false, undone_ = false, write_focus_ = false;
+  std::size_t undo_steps_ = 0;
+  std::uint64_t times_undone_ = 0;
+  std::optional<Vec3> writing_;  // where a note is pinned
+  std::string note_text_;
+  int note_answer_ = 0;  // 1: kept, -1: not
+  bool hand_page_ = false;
+};
+
+}  // namespace osteo::app

@@ -1,0 +1,128 @@
+#include "scene_painter.h"
+
+// GLEW, through VTK, must come before anything that includes GL.
+#include <vtk_glew.h>
+
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkOpenGLState.h>
+#include <vtkRenderer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/changes.h"
+
+namespace osteo::inline app {
+namespace {
+
+// How long nothing has changed when the picture rests; how often panels alone are shown again, with and without a change that is known of.
+constexpr std::chrono::milliseconds kRest{300}, kPanels{100}, kPictures{250};
+constexpr double kLookAgainS = 0.008, kIdleS = 0.05;
+
+void add(std::uint64_t& h, const void* data, std::size_t bytes) {
+  const auto* const p = static_cast<const unsigned char*>(data);
+  std::size_t i = 0;
+  for (; i + 8 <= bytes; i += 8) {
+    std::uint64_t v = 0;
+    std::copy_n(p + i, 8, reinterpret_cast<unsigned char*>(&v));
+    h = (h ^ v) * 0x9e3779b97f4a7c15ULL;
+    h ^= h >> 29;
+  }
+  for (; i < bytes; ++i) h = (h ^ p[i]) * 0x100000001b3ULL;
+}
+
+}  // namespace
+
+std::uint64_t panels_stamp(const ImDrawData* panels) {
+  std::uint64_t h = 1;
+  for (int n = 0; n < panels->CmdListsCount; ++n) {
+    const ImDrawList& list = *panels->CmdLists[n];
+    add(h, list.VtxBuffer.Data, static_cast<std::size_t>(list.VtxBuffer.size_in_bytes()));
+    add(h, list.IdxBuffer.Data, static_cast<std::size_t>(list.IdxBuffer.size_in_bytes()));
+    for (const ImDrawCmd& c : list.CmdBuffer) {
+      add(h, &c.ClipRect, sizeof c.ClipRect);
+      add(h, &c.TextureId, sizeof c.TextureId);
+    }
+  }
+  return h;
+}
+
+ScenePainter::ScenePainter(vtkGenericOpenGLRenderWindow* window, vtkRenderer* renderer) : window_(window), renderer_(renderer) {
+  window->SetFrameBlitModeToNoBlit();
+}
+
+bool ScenePainter::begin(const Turn& turn, const ImDrawData* panels) {
+  began_ = Clock::now();
+  const bool resized = turn.width != turn_.width || turn.height != turn_.height || turn.box.left != turn_.box.left ||
+                       turn.box.bottom != turn_.box.bottom || turn.box.width != turn_.box.width || turn.box.height != turn_.box.height;
+  turn_ = turn;
+  const std::uint64_t scene = scene_stamp(renderer_), flat = panels_stamp(panels);
+  if (scene != seen_ || resized) {
+    seen_ = scene;
+    changed_at_ = began_;
+  }
+  moving_ = !turn.still && (began_ - changed_at_ < kRest || !turn.settled);
+  const PictureStyle style = quality_.style(moving_);
+  // A picture that was drawn at rest stays until something changes.
+  draws_ = scene != stamp_ || resized || drawn_ == 0 || (!moving_ && style != style_);
+  if (draws_) {
+    stamp_ = scene;
+    style_ = style;
+  }
+  const auto since = began_ - shown_at_;
+  const bool shows = draws_ || turn.still || (flat != panels_ && (turn.input || since > kPanels)) || since > kPictures;
+  if (shows) panels_ = flat;
+  return shows;
+}
+
+void ScenePainter::show() {
+  const int width = std::max(1, static_cast<int>(std::lround(turn_.box.width * style_.scale))),
+            height = std::max(1, static_cast<int>(std::lround(turn_.box.height * style_.scale)));
+  if (draws_) {
+    double before[4];
+    renderer_->GetViewport(before);
+    // VTK clears and copies its window whole: no larger than what is drawn. Others see the window as it is.
+    window_->SetSize(width, height);
+    renderer_->SetViewport(0, 0, 1, 1);
+    set_depth(renderer_, style_);
+    window_->GetState()->Reset();
+    window_->Render();
+    renderer_->SetViewport(before);
+    window_->SetSize(turn_.width, turn_.height);
+    stamp_ = seen_ = scene_stamp(renderer_);  // occlusion touches what it draws for the first time
+    ++drawn_;
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  window_->BlitDisplayFramebuffer(0, 0, 0, width, height, turn_.box.left, turn_.box.bottom, turn_.box.width, turn_.box.height,
+                                  GL_COLOR_BUFFER_BIT, style_.scale < 1 ? GL_LINEAR : GL_NEAREST);
+  // VTK leaves its state for itself; ImGui saves and restores what it touches.
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glDisable(GL_SCISSOR_TEST);
+  glViewport(0, 0, turn_.width, turn_.height);
+}
+
+void ScenePainter::done() {
+  shown_at_ = Clock::now();
+  if (draws_)
+    quality_.took(style_, moving_, std::chrono::duration<double, std::milli>(shown_at_ - began_).count(),
+                  static_cast<double>(turn_.box.width) * turn_.box.height);
+}
+
+void ScenePainter::wait() const {
+  glfwWaitEventsTimeout(Clock::now() - changed_at_ < std::chrono::seconds(1) ? kLookAgainS : kIdleS);
+}
+
+std::string ScenePainter::words() const {
+  char text[96];
+  const QualityChoice& q = quality_;
+  const auto name = [](Quality level) { return std::string(EnumNames<Quality>::values[static_cast<std::size_t>(level)]); };
+  std::snprintf(text, sizeof text, "picture %.0f ms, at rest %.0f ms", q.moving_ms(), q.resting_ms());
+  return std::string(text) + "\nquality (J): " + name(q.wish()) + (q.wish() == Quality::automatic ? ", now " + name(q.level()) : "");
+}
+
+}  // namespace osteo::app

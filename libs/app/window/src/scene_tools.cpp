@@ -1,0 +1,208 @@
+#include "scene_tools.h"
+
+#include <imgui.h>
+
+#include <vtkActor.h>
+#include <vtkCellArray.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtkRenderer.h>
+
+#include "osteo/simulation/bone/plates.h"
+#include "osteo/simulation/bone/world_mesh.h"
+#include "osteo/display/view/actors.h"
+#include "osteo/display/view/plate_view.h"
+#include "ui_style.h"
+
+namespace osteo::inline app {
+namespace {
+
+using Tool = HandTools::Tool;
+
+void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, std::array<char, 64>& plan_name) {
+  SawCut cut = tools.cut();
+  const auto slider = [](const char* name, double& mm, float least, float most, const char* format) {
+    float value = static_cast<float>(mm);
+    if (ImGui::SliderFloat(name, &value, least, most, format)) mm = static_cast<double>(value);
+  };
+  slider("kerf", cut.kerf_mm, 0.2F, 5, "%.1f mm");
+  slider("long", cut.length_mm, 0, 150, cut.length_mm > 0 ? "%.0f mm" : "through");
+  slider("deep", cut.depth_mm, 0, 150, cut.depth_mm > 0 ? "%.0f mm" : "through");
+  tools.set_cut(cut);
+  if (!tools.planned().empty()) ImGui::SetNextItemWidth(-1);
+  if (!tools.planned().empty() && ImGui::BeginCombo("##planned", "planned cuts")) {
+    for (std::size_t i = 0; i < tools.planned().size(); ++i) {
+      if (ImGui::Selectable(tools.planned()[i].name.c_str())) tools.choose_planned(i);
+    }
+    ImGui::EndCombo();
+  }
+  if (ImGui::Button("as I see it")) tools.aim_saw(view, false);
+  ImGui::SameLine();
+  if (ImGui::Button("flat")) tools.aim_saw(view, true);
+  if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
+  // By force and time, with this plane as the cutting guide.
+  if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::InputTextWithHint("##plan", "keep as planned: name, Enter", plan_name.data(), plan_name.size(),
+                               ImGuiInputTextFlags_EnterReturnsTrue)) {
+    tools.keep_planned(plan_name.data());
+    plan_name.fill(0);
+  }
+}
+
+void piece_panel(HandTools& tools, Rehearsal& rehearsal) {
+  if (ImGui::Button("Take apart (Enter)", {-1, 0})) tools.perform(rehearsal);
+  if (tools.piece() == SceneAction::kNobody) {
+    ImGui::TextWrapped("Press on a piece and drag it; with Shift it turns.");
+    return;
+  }
+  const Vec3 by = tools.piece_pose().shift_mm;
+  ImGui::Text("piece %u  %+.1f %+.1f %+.1f mm", tools.piece(), by.x, by.y, by.z);
+  if (ImGui::Button("Put back", {-1, 0})) tools.put_piece_back(rehearsal);
+}
+
+void plate_panel(HandTools& tools, Rehearsal& rehearsal) {
+  std::size_t plate = tools.plate();
+  float turn = tools.plate_turn_deg(), tilt = tools.plate_tilt_deg();
+  bool changed = false;
+  if (ImGui::BeginCombo("plate", plate_library()[plate].name.c_str())) {
+    for (std::size_t i = 0; i < plate_library().size(); ++i) {
+      if (ImGui::Selectable(plate_library()[i].name.c_str(), i == plate)) {
+        plate = i;
+        changed = true;
+      }
+    }
+    ImGui::EndCombo();
+  }
+  ImGui::TextWrapped("%s", plate_library()[plate].about.c_str());
+  changed |= ImGui::SliderFloat("turn", &turn, -180, 180, "%.0f deg");
+  changed |= ImGui::SliderFloat("tilt", &tilt, -90, 90, "%.0f deg");
+  if (changed) tools.set_plate(plate, turn, tilt, rehearsal);
+  if (ImGui::Button("Fix it here (Enter)", {-1, 0})) tools.perform(rehearsal);
+}
+
+// Where it should lie on bone.
+void tell_collision(double mm) {
+  if (mm > kPlateCollisionMm) ImGui::TextColored({1.0F, 0.45F, 0.35F, 1}, "%.1f mm deep in bone", mm);
+}
+
+}  // namespace
+
+void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw) {
+  if (tools.tool() != Tool::saw && !tools.saw_in_hand()) return;
+  const SawCut& cut = tools.cut();
+  const auto middle = project(cut.at_mm);
+  if (!middle) return;
+  // As far as the cut goes, or as can be told from here: what lies behind the eye has no place in the picture.
+  const double half_mm = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
+  const float e = em();
+  draw->PushClipRect({area.x, area.y}, {area.right(), area.bottom()});
+  for (const double way : {-1.0, 1.0}) {
+    for (double mm = half_mm; mm > 1; mm /= 2) {
+      const auto end = project(cut.at_mm + normalized(cut.along) * (way * mm));
+      if (!end) continue;
+      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, IM_COL32(0, 0, 0, 160), e / 4);
+      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, im_colour32(palette::kSkyBlue), e / 8);
+      break;
+    }
+  }
+  draw->AddCircleFilled({(*middle)[0], (*middle)[1]}, e * 0.35F, IM_COL32(0, 0, 0, 160));
+  draw->AddCircle({(*middle)[0], (*middle)[1]}, e * 0.35F, im_colour32(palette::kSkyBlue), 16, e / 8);
+  draw->PopClipRect();
+}
+
+SceneTools::SceneTools(vtkRenderer* renderer) : renderer_(renderer), hand_plate_(renderer) {
+  plane_data_ = vtkSmartPointer<vtkPolyData>::New();
+  plane_ = make_late_actor(Late::all);
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputData(plane_data_);
+  plane_->SetMapper(mapper);
+  plane_->GetProperty()->SetColor(0.35, 0.75, 1.0);
+  plane_->GetProperty()->SetOpacity(0.4);
+  plane_->GetProperty()->LightingOff();
+  plane_->GetProperty()->EdgeVisibilityOn();
+  plane_->GetProperty()->SetEdgeColor(0.6, 0.9, 1.0);
+  plane_->VisibilityOff();
+  renderer_->AddActor(plane_);
+}
+
+SceneTools::~SceneTools() {
+  renderer_->RemoveActor(plane_);
+}
+
+void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view) {
+  static constexpr std::pair<const char*, Tool> kTools[] = {
+      {"drill", Tool::drill}, {"saw (X)", Tool::saw}, {"pieces (P)", Tool::piece}, {"plates (L)", Tool::plate}};
+  for (const auto& [name, tool] : kTools) {
+    if (tool != Tool::drill && tool != Tool::piece) ImGui::SameLine();
+    const bool held = tools.tool() == tool && !tools.saw_in_hand();
+    if (ImGui::RadioButton(name, held) && !held) tools.choose(tool, rehearsal, view);
+  }
+  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, plan_name_);
+  if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
+  if (tools.tool() == Tool::plate) {
+    plate_panel(tools, rehearsal);
+    tell_collision(hand_in_bone_mm_);
+  }
+  std::vector<Fixture> fixtures;
+  std::vector<double> in_bone_mm;
+  rehearsal.look([&](const World& world, SceneReaders&) {
+    fixtures = world.fixtures();
+    for (const Fixture& f : fixtures)
+      in_bone_mm.push_back(plate_in_bone_mm(world, plate_library()[f.plate], pose_of(world, f), f.opening_mm));
+  });
+  for (const Fixture& f : fixtures) {
+    const PlateModel& model = plate_library()[f.plate];
+    ImGui::PushID(static_cast<int>(f.id));
+    ImGui::Text("%u: %s", f.id, model.name.c_str());
+    ImGui::SameLine();
+    if (ImGui::SmallButton("take off")) rehearsal.act(SceneAction::detach(f.id));
+    tell_collision(in_bone_mm[static_cast<std::size_t>(&f - fixtures.data())]);
+    if (model.most_opening_mm > 0 && f.other != SceneAction::kNobody) {
+      float opening = static_cast<float>(f.opening_mm);
+      if (ImGui::SliderFloat("open", &opening, 0, static_cast<float>(model.most_opening_mm), "%.1f mm"))
+        rehearsal.act(SceneAction::open(f.id, static_cast<double>(opening)));
+    }
+    ImGui::PopID();
+  }
+  if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
+}
+
+void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world) {
+  const SawCut& cut = tools.cut();
+  const bool shown = tools.tool() == Tool::saw || tools.saw_in_hand();
+  plane_->SetVisibility(shown ? 1 : 0);
+  if (shown) {
+    const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(n, cut.along)), across = cross(n, along);
+    const double half_long = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;
+    const double half_deep = (cut.depth_mm > 0 ? cut.depth_mm : 1.4 * tools.size_mm()) / 2;
+    vtkNew<vtkPoints> points;
+    vtkNew<vtkCellArray> cells;
+    // The blade's two faces.
+    for (const double side : {-0.5, 0.5}) {
+      const vtkIdType first = points->GetNumberOfPoints();
+      for (const auto& [a, b] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}}) {
+        const Vec3 p = cut.at_mm + n * (side * cut.kerf_mm) + along * (a * half_long) + across * (b * half_deep);
+        points->InsertNextPoint(p.x, p.y, p.z);
+      }
+      const vtkIdType quad[4] = {first, first + 1, first + 2, first + 3};
+      cells->InsertNextCell(4, quad);
+    }
+    plane_data_->SetPoints(points);
+    plane_data_->SetPolys(cells);
+    plane_data_->Modified();
+  }
+  const bool plate = (tick.flags & kPlateInHand) != 0;
+  hand_in_bone_mm_ = 0;
+  if (!plate) return hand_plate_.hide_in_hand();
+  const RigidTransform pose = plate_pose(from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm),
+                                         normalized(from_floats(tick.device.axis)), tools.plate_grip());
+  hand_plate_.show_in_hand(world, static_cast<std::uint32_t>(tools.plate()), pose);
+  hand_in_bone_mm_ = plate_in_bone_mm(world, plate_library()[tools.plate()], pose);
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,47 @@
+// The hand's tools as one sees them: cursors in the scene, a section of the panel. Private to libs/app/window.
+#pragma once
+#include <vtkSmartPointer.h>
+
+#include <array>
+#include <functional>
+#include <optional>
+
+#include "hand_tools.h"
+#include "osteo/display/view/plate_view.h"
+#include "room_layout.h"
+
+struct ImDrawList;
+class vtkActor;
+class vtkPolyData;
+class vtkRenderer;
+
+namespace osteo::inline app {
+
+/// A point of the world in pixels of the window; nothing behind the eye.
+using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
+/// The saw's line over the picture, within `area`: seen edge on its plane is as thin as the blade, and bone hides it. No-op without a saw.
+void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw);
+
+class SceneTools {
+ public:
+  /// After what else is drawn: what one sees through is drawn in the order in which it is added.
+  explicit SceneTools(vtkRenderer* renderer);
+  ~SceneTools();
+  SceneTools(const SceneTools&) = delete;
+  SceneTools& operator=(const SceneTools&) = delete;
+
+  /// A section of the panel.
+  void panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view);
+  /// Cursors of the tools, before each frame.
+  void show(const HandTools& tools, const TickRecord& tick, const World& world);
+
+ private:
+  vtkRenderer* renderer_;
+  vtkSmartPointer<vtkActor> plane_;
+  vtkSmartPointer<vtkPolyData> plane_data_;
+  PlateView hand_plate_;
+  double hand_in_bone_mm_ = 0;
+  std::array<char, 64> plan_name_{};
+};
+
+}  // namespace osteo::app

@@ -1,0 +1,106 @@
+#include "scope_panel.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <string>
+
+#include "osteo/core/base/param.h"
+
+namespace osteo::inline app {
+
+void draw_scope(const ScopeView& view, const PictureArea& area, StereoMode stereo) {
+  const ScaleBar bar = scale_bar(view.pixels_per_mm(area), 0.22 * area.width);
+  const std::string length = format_number(bar.length_mm) + " mm", words = scope_words(view);
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const float line = ImGui::GetTextLineHeight();
+  const auto draw = [&](double right, double up, double squeezed) {
+    const float x = static_cast<float>(area.x + right * area.width) + line, y = static_cast<float>(area.y + area.height * (1 - up)) - line;
+    const float wide = static_cast<float>(bar.length_px * squeezed);
+    constexpr ImU32 kInk = IM_COL32(235, 235, 235, 255);
+    const float most = std::max(wide, ImGui::CalcTextSize(words.c_str()).x);
+    list->AddRectFilled({x - 8, y - 14 - 2 * line}, {x + most + 8, y + 8}, IM_COL32(10, 14, 20, 150), 4);  // legible on white bone too
+    list->AddRectFilled({x, y - 3}, {x + wide, y}, kInk);
+    list->AddText({x, y - 5 - line}, kInk, length.c_str());
+    list->AddText({x, y - 7 - 2 * line}, kInk, words.c_str());
+  };
+  draw(0, 0, stereo == StereoMode::side_by_side ? 0.5 : 1);
+  if (stereo == StereoMode::side_by_side) draw(0.5, 0, 0.5);
+  if (stereo == StereoMode::top_bottom) draw(0, 0.5, 1);
+}
+
+namespace {
+
+void draw_stereo(StereoScreen& screen) {
+  static constexpr const char* kModes[] = {"one picture",          "side by side",    "top and bottom",
+                                           "anaglyph (red, cyan)", "interlaced rows", "quad buffer"};
+  StereoParams& s = screen.params;
+  int mode = static_cast<int>(s.mode);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::Combo("##stereo", &mode, kModes, IM_ARRAYSIZE(kModes))) s.mode = static_cast<StereoMode>(mode);
+  if (s.mode == StereoMode::quad_buffer && !screen.has_quad_buffer())
+    ImGui::TextWrapped(
+        "This display has no buffer for each eye, or the window was not opened with --stereo quad_buffer: the left eye is shown.");
+  if (s.mode == StereoMode::off) return;
+  auto base = static_cast<float>(s.base_mm), convergence = static_cast<float>(s.convergence_mm);
+  if (ImGui::SliderFloat("base, mm", &base, 0, 65, "%.0f")) s.base_mm = static_cast<double>(base);
+  if (ImGui::SliderFloat("in front, mm", &convergence, -50, 50, "%.0f")) s.convergence_mm = static_cast<double>(convergence);
+  ImGui::Checkbox("eyes swapped", &s.swap);
+}
+
+}  // namespace
+
+void draw_scope_panel(ScopeInput& scope, StereoScreen& stereo, const ScopeScene& scene) {
+  ImGui::Text("Look from");
+  const auto button = [&](const char* name, StandardView from, bool last = false) {
+    if (ImGui::Button(name)) scope.overview(from, scene, true);
+    if (!last) ImGui::SameLine();
+  };
+  button("left", StandardView::left);
+  button("right", StandardView::right);
+  button("front", StandardView::front);
+  button("above", StandardView::above, true);
+  button("surgeon", StandardView::surgeon);
+  if (ImGui::Button("drill (G)")) scope.control.look_at(scene.drill_mm);
+  ImGui::SameLine();
+  if (ImGui::Button("along it")) scope.control.look_along(scene.drill_mm, scene.handle);
+  ImGui::Text("%s", scope_words(scope.view()).c_str());
+  if (!ImGui::TreeNode("microscope", "Microscope")) return;
+  ScopeControl& control = scope.control;
+  ImGui::PushItemWidth(-5.5F * ImGui::GetFontSize());  // room for their names
+  if (ImGui::Button("Camera back (Backspace)", {-1, 0})) static_cast<void>(control.undo());
+  auto m = static_cast<float>(scope.view().magnification);
+  if (ImGui::SliderFloat("x", &m, 0.5F, 40, "%.1f", ImGuiSliderFlags_Logarithmic))
+    control.zoom(static_cast<double>(m) / scope.view().magnification);
+  auto wd = static_cast<float>(scope.view().working_distance_mm);
+  if (ImGui::SliderFloat("WD, mm", &wd, 150, 600, "%.0f")) control.set_working_distance(static_cast<double>(wd));
+  bool upright = control.target().upright;
+  if (ImGui::Checkbox("head stays up", &upright)) control.set_upright(upright);
+  ImGui::Checkbox("fly to views (0.4 s)", &control.flights);
+  auto inertia = static_cast<float>(control.arm.params.inertia_s);
+  if (ImGui::SliderFloat("inertia, s", &inertia, 0, 0.5F, "%.2f")) control.arm.params.inertia_s = static_cast<double>(inertia);
+  ImGui::Text("O, pedal: the device");
+  int mode = static_cast<int>(scope.mode);
+  bool changed = ImGui::RadioButton("moves", &mode, 0);
+  ImGui::SameLine();
+  changed = ImGui::RadioButton("turns", &mode, 1) || changed;
+  ImGui::SameLine();
+  changed = ImGui::RadioButton("both", &mode, 2) || changed;
+  if (changed) scope.mode = static_cast<CameraGuide>(mode);
+  for (int n = 0; n < static_cast<int>(ScopeControl::kBookmarks); ++n) {
+    const std::string name = "F" + std::to_string(6 + n), keep = "keep##" + name;
+    const bool kept = control.bookmark(static_cast<std::size_t>(n)).has_value();
+    if (!kept) ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 0.5F);
+    if (ImGui::Button(name.c_str()) && kept) static_cast<void>(control.go_to_bookmark(static_cast<std::size_t>(n)));
+    if (!kept) ImGui::PopStyleVar();
+    ImGui::SameLine();
+    if (ImGui::Button(keep.c_str())) control.set_bookmark(static_cast<std::size_t>(n));
+    if (n + 1 < static_cast<int>(ScopeControl::kBookmarks)) ImGui::SameLine();
+  }
+  ImGui::Text("Stereo");
+  draw_stereo(stereo);
+  ImGui::PopItemWidth();
+  ImGui::TreePop();
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,68 @@
+#include "second_hand.h"
+
+#include <algorithm>
+
+namespace osteo::inline app {
+namespace {
+
+// What it may hold, in turn; the first: nothing.
+constexpr const char* kSecond[] = {"", "sucker 10 Fr", "irrigator 2 mm", "probe 1 mm"};
+constexpr const char* kNone = "there is no second hand: --dust, or --second-device";
+
+MouseDevice* moved_by_window(Rehearsal& rehearsal) {
+  return rehearsal.hands() > 1 ? dynamic_cast<MouseDevice*>(&rehearsal.device(1)) : nullptr;
+}
+
+}  // namespace
+
+std::string SecondHand::take_next(Rehearsal& rehearsal) {
+  if (rehearsal.hands() < 2) return kNone;
+  holds_ = (holds_ + 1) % std::size(kSecond);
+  if (moved_by_window(rehearsal) == nullptr) {
+    holds_ = std::max<std::size_t>(holds_, 1);
+    rehearsal.device(1).set_tool(static_cast<std::uint8_t>(instrument_index(kSecond[holds_])));
+  }
+  if (holds_ == 0) follow();
+  return holds_ == 0 ? "second hand: nothing" : std::string("second hand: ") + kSecond[holds_];
+}
+
+bool SecondHand::move(Rehearsal& rehearsal, Vec3 by_mm, std::string& said) {
+  if (moved_by_window(rehearsal) == nullptr) {
+    said = rehearsal.hands() < 2 ? kNone : "the second hand has a device of its own";
+    return false;
+  }
+  if (holds_ == 0) said = take_next(rehearsal);
+  if (!placed_mm_) placed_mm_ = from_floats(rehearsal.latest(1).device.position_mm);
+  *placed_mm_ += by_mm;
+  return true;
+}
+
+void SecondHand::hold(Rehearsal& rehearsal, const ViewAxes& view, bool suck, bool wash, bool works, bool left_handed) {
+  empty_ = false;
+  MouseDevice* const hand = moved_by_window(rehearsal);
+  if (hand == nullptr) return;
+  sucking_ = suck || (works && !wash && holds_ == 1);
+  washing_ = wash || (works && !suck && holds_ == 2);
+  works = works || suck || wash;
+  empty_ = !works && holds_ == 0;
+  const TickRecord tick = rehearsal.latest();
+  HandGoal goal;
+  goal.tool = static_cast<std::uint8_t>(instrument_index(suck   ? kSecond[1]
+                                                         : wash ? kSecond[2]
+                                                                : kSecond[std::max<std::size_t>(holds_, 1)]));
+  goal.pedal = works ? 255 : 0;
+  // From the side where the drill's handle is not.
+  const Vec3 side = view.right * (left_handed ? 1.0 : -1.0);
+  goal.axis = to_floats(normalized(side - view.forward));
+  if (placed_mm_) {
+    goal.position_mm = *placed_mm_;
+  } else {
+    const double gap = instrument_of(tick.device.tool).head.largest_radius_mm() + instrument_of(goal.tool).head.largest_radius_mm();
+    goal.position_mm = from_floats(tick.device.position_mm) + from_floats(tick.shown_offset_mm) + side * gap;
+    // Held ready beside it, or put away.
+    if (!works) goal.position_mm += holds_ > 0 ? side * 8 - view.forward * 6 : side * 30 - view.forward * 40;
+  }
+  hand->set_goal(goal);
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,64 @@
+// What the start page offers: cases opened last, sessions that can be gone on from, folders to look into. Private to libs/app/window; no ImGui.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "osteo/app/window/start_page.h"
+
+namespace osteo::inline app {
+
+enum class FolderKind { nothing, folder, the_case, session };
+struct FolderLook {
+  FolderKind kind = FolderKind::nothing;
+  std::filesystem::path folder;
+  std::string why;  ///< of nothing: what it is instead, and what to do
+};
+/// What a path stands for. A file that a case or a session is known by (manifest.json, session.json, stream.oss) stands for its folder.
+/// Reads names only. Never throws.
+[[nodiscard]] FolderLook look_at_path(const std::filesystem::path& path);
+
+struct StartEntry {
+  enum class Group { recent, session, browse } group = Group::recent;
+  FolderKind kind = FolderKind::folder;
+  std::filesystem::path folder;
+  std::string words;
+};
+
+class StartList {
+ public:
+  static constexpr std::size_t kMostListed = 500;
+  /// `from`: the folder that the browser begins in; one that cannot be read is told in message().
+  StartList(std::vector<std::filesystem::path> recent, std::filesystem::path from);
+
+  [[nodiscard]] const std::vector<StartEntry>& entries() const { return entries_; }
+  [[nodiscard]] int selected() const { return selected_; }
+  void select(int entry);
+  void move(int by);  ///< stops at the ends
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// Opens the entry: a folder is looked into; a case or a session is a choice.
+  std::optional<StartChoice> open();
+  void up();  ///< to the folder above
+  /// What was dropped onto the window, or chosen in a dialog: of several things the first that is a case or a session.
+  std::optional<StartChoice> take(const std::vector<std::filesystem::path>& paths);
+
+  [[nodiscard]] const std::string& message() const { return message_; }
+  void say(std::string text) { message_ = std::move(text); }
+  void forget_recent();
+
+ private:
+  std::optional<StartChoice> take_one(const std::filesystem::path& path);
+  void list();
+  void look_into(const std::filesystem::path& folder);
+  std::vector<std::filesystem::path> recent_;
+  std::filesystem::path folder_;
+  std::vector<StartEntry> entries_;
+  int selected_ = 0;
+  std::string message_;
+};
+
+/// Sessions of a case, the last first; by the number or the name of their folders.
+[[nodiscard]] std::vector<std::filesystem::path> sessions_of(const std::filesystem::path& the_case);
+
+}  // namespace osteo::app

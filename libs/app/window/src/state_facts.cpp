@@ -1,0 +1,108 @@
+#include "state_facts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "osteo/session/scene/heat_reader.h"
+
+namespace osteo::inline app {
+namespace {
+
+template <class... A>
+std::string text_of(const char* format, A... a) {
+  char out[96];
+  std::snprintf(out, sizeof out, format, a...);
+  return out;
+}
+
+}  // namespace
+
+std::string clock_text(double seconds) {
+  const auto whole = static_cast<long>(std::max(0.0, seconds));
+  if (whole >= 3600) return text_of("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
+  return text_of("%ld:%02ld", whole / 60, whole % 60);
+}
+
+StateFacts state_of_tick(const TickRecord& tick, const StructureMap* structures, double rate_hz) {
+  StateFacts f;
+  const Instrument& held = instrument_of(tick.device.tool);
+  f.tool = (tick.flags & kPlateInHand) != 0 ? "plate in the hand" : held.name;
+  f.turning = tick.speed_rpm > 0;
+  // The last digits of a speed that follows a pedal would only flicker.
+  f.speed = f.turning ? text_of("%.0f rpm", 500 * std::round(static_cast<double>(tick.speed_rpm) / 500)) : "still";
+  f.force_n = length(from_floats(tick.force_n));
+  f.force = text_of("%.2f N", f.force_n);
+  f.force_share = std::min(1.0, f.force_n / StateFacts::kFullForceN);
+  f.depth = text_of("%.2f mm", static_cast<double>(tick.depth_mm));
+  f.under = tick.thickness_mm <= 0    ? std::string("-")
+            : tick.thickness_mm >= 10 ? std::string("over 10 mm")
+                                      : text_of("%.1f mm", static_cast<double>(tick.thickness_mm));
+  if (structures == nullptr) {
+    f.structure = "none in this case";
+  } else if (tick.structure == 0) {
+    f.nearness = Nearness::far;
+    f.structure = text_of("none within %.0f mm", structures->reach_mm());
+  } else {
+    const auto mm = static_cast<double>(tick.clearance_mm);
+    f.structure = structures->name_of(static_cast<std::uint8_t>(tick.structure));
+    f.nearness = mm <= 0                     ? Nearness::touched
+                 : mm < StateFacts::kCloseMm ? Nearness::close
+                 : mm < StateFacts::kNearMm  ? Nearness::near
+                                             : Nearness::far;
+    f.distance = text_of("%.1f mm", std::max(0.0, mm));
+  }
+  f.time = clock_text(static_cast<double>(tick.tick) / rate_hz);
+  if ((tick.flags & kStructureInjured) != 0) {
+    f.warning = "the turning burr touches " + f.structure;
+    f.alarm = true;
+  } else if ((tick.flags & kEscape) != 0) {
+    f.warning = "the burr is buried in bone";
+    f.alarm = true;
+  } else if ((tick.flags & kShaftContact) != 0) {
+    f.warning = "the shaft touches bone";
+  } else if ((tick.flags & kNoRoom) != 0) {
+    f.warning = "no room: bone is left at the burr's rim";
+  }
+  return f;
+}
+
+bool warning_is_told(const StateFacts& facts, const std::string& message) {
+  return !facts.warning.empty() && !(facts.lasts && !message.empty());
+}
+
+void tell_warmth(StateFacts& f, const WarmthNow& warmth, const TickRecord& tick, const StructureMap* structures) {
+  const auto of = warmth.structures_c.find(static_cast<std::uint8_t>(tick.structure));
+  if (tick.structure == 0 || structures == nullptr) {
+    f.warmth = text_of("bone up to %.0f C", warmth.bone_c);
+  } else {
+    f.warmth = text_of("%.1f C", of == warmth.structures_c.end() ? 37.0 : of->second);
+  }
+  if (structures == nullptr || f.alarm) return;
+  const auto worst = std::max_element(warmth.structures_c.begin(), warmth.structures_c.end(),
+                                      [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (worst == warmth.structures_c.end() || worst->second < 47) return;
+  f.warning = structures->name_of(worst->first) + text_of(" is at %.0f C: stop, and rinse", worst->second);
+  f.alarm = worst->second >= kCoagulatedC;
+}
+
+StateFacts state_facts(const Rehearsal& rehearsal, const TickRecord& tick, const WarmthNow* warmth) {
+  StateFacts f = state_of_tick(tick, rehearsal.structures(), rehearsal.rate_hz());
+  if (warmth != nullptr) tell_warmth(f, *warmth, tick, rehearsal.structures());
+  f.removed = text_of("%.1f mm3", rehearsal.removed_mm3());
+  if (rehearsal.soft() != nullptr) f.removed += text_of(", tissue %.1f", rehearsal.tissue_mm3());
+  // A recording in trouble comes before everything: nothing of what follows would be kept.
+  if (const std::string trouble = rehearsal.trouble(); !trouble.empty()) {
+    f.warning = trouble;
+    f.alarm = rehearsal.recording().failure.has_value();
+    return f;
+  }
+  if (!f.warning.empty()) return f;
+  const Burr* const edge = instrument_of(tick.device.tool).cutter();
+  f.lasts = true;
+  if (edge != nullptr) f.warning = too_small_for_voxels(*edge, rehearsal.finest_voxel_mm());
+  if (f.warning.empty() && rehearsal.pieces() > 1) f.warning = text_of("the bone is in %d pieces", rehearsal.pieces());
+  return f;
+}
+
+}  // namespace osteo::app

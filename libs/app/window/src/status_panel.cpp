@@ -1,0 +1,31 @@
+#include "status_panel.h"
+
+#include <imgui.h>
+
+#include "ui_style.h"
+
+namespace osteo::inline app {
+// The words of the import's verdict.
+void draw_scan(const VerdictSummary& scan) {
+  if (scan.status.empty()) return;
+  const bool open = ImGui::TreeNode("scan", "Scan: %s (%d notes)", scan.status.c_str(), static_cast<int>(scan.findings.size()));
+  if (!open) return;
+  for (const Finding& f : scan.findings) {
+    const ImVec4 colour = f.severity == Severity::info ? im_colour(palette::kFaint) : im_colour(palette::kYellow);
+    ImGui::PushStyleColor(ImGuiCol_Text, colour);
+    ImGui::TextWrapped("%s [%s]", f.message.c_str(), f.code.c_str());
+    ImGui::PopStyleColor();
+    if (!f.advice.empty()) ImGui::TextWrapped("%s", f.advice.c_str());
+  }
+  ImGui::TreePop();
+  ImGui::Separator();
+}
+
+void draw_approval(const std::string& words, bool ended) {
+  if (words.empty()) return;
+  ImGui::PushStyleColor(ImGuiCol_Text, ended ? im_colour(palette::kYellow) : im_colour(palette::kFaint));
+  ImGui::TextWrapped("Case: %s", words.c_str());
+  ImGui::PopStyleColor();
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,45 @@
+#include "steps.h"
+
+#include <cmath>
+
+#include "keys.h"
+
+namespace osteo::inline app {
+namespace {
+
+enum : std::size_t { kDrill, kUndo, kSuck, kZoom, kCut, kPlate };
+constexpr double kDrilledMm3 = 0.5, kSuckedMm3 = 0.05, kZoomed = 0.1;
+
+}  // namespace
+
+FirstSteps::FirstSteps() {
+  const auto key = [](Command c) { return key_name(c); };
+  steps_ = {{"Drill: point at the bone, " + key(Command::bring) + " brings the drill; hold the left button, wheel away from you: deeper"},
+            {"Undo: " + key(Command::undo) + " takes the last stroke back"},
+            {"Suck: drill on, and hold " + key(Command::suck) + ": a sucker beside the burr takes the dust"},
+            {"Zoom: Ctrl-wheel; right drag turns the view"},
+            {"Cut: " + key(Command::saw) + " sets the saw where you point, drag moves it, " + key(Command::perform) + " cuts"},
+            {"Plate: " + key(Command::plates) + " takes one, " + key(Command::bring) + " brings it where you point, wheel presses it on, " +
+             key(Command::perform) + " fixes it"}};
+}
+
+void FirstSteps::see(const StepFacts& now) {
+  steps_[kSuck].possible = now.dust;
+  if (!first_) first_ = now;
+  const auto tick = [&](std::size_t step, bool so) { steps_[step].done = steps_[step].done || so; };
+  tick(kDrill, now.removed_mm3 - first_->removed_mm3 > kDrilledMm3);
+  tick(kUndo, now.undone);
+  tick(kSuck, now.sucked_mm3 - first_->sucked_mm3 > kSuckedMm3);
+  tick(kZoom, std::abs(now.magnification / first_->magnification - 1) > kZoomed);
+  tick(kCut, now.sawn_mm3 > first_->sawn_mm3);
+  tick(kPlate, now.fixtures > first_->fixtures);
+}
+
+int FirstSteps::next() const {
+  for (std::size_t n = 0; n < steps_.size(); ++n) {
+    if (steps_[n].possible && !steps_[n].done) return static_cast<int>(n);
+  }
+  return -1;
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,40 @@
+// The first five minutes: what a new user does once, ticked off by what came of it. Private to libs/app/window; no ImGui.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace osteo::inline app {
+
+/// What can be seen of a rehearsal, picture by picture.
+struct StepFacts {
+  double removed_mm3 = 0, sawn_mm3 = 0;
+  std::size_t undo_steps = 0, fixtures = 0;
+  bool undone = false;  ///< something was taken back in this picture
+  bool dust = false;    ///< the scene has any: else nothing can be sucked off
+  double sucked_mm3 = 0;
+  double magnification = 1;
+};
+
+struct Step {
+  std::string words;  ///< what to do, with its keys; its name up to the colon
+  bool possible = true, done = false;
+  [[nodiscard]] std::string name() const { return words.substr(0, words.find(':')); }
+};
+
+class FirstSteps {
+ public:
+  FirstSteps();
+  /// Another session has begun: what was done stays done.
+  void renew() { first_.reset(); }
+  void see(const StepFacts& facts);
+  [[nodiscard]] const std::vector<Step>& steps() const { return steps_; }
+  /// The first that is possible and not done; -1: all are.
+  [[nodiscard]] int next() const;
+
+ private:
+  std::vector<Step> steps_;
+  std::optional<StepFacts> first_;
+};
+
+}  // namespace osteo::app

@@ -1,0 +1,50 @@
+#include "tool_touch.h"
+
+#include <cmath>
+
+#include "osteo/core/base/json_document.h"
+
+namespace osteo::inline app {
+namespace {
+
+std::string name_of(const Instrument& held, bool head) {
+  const std::string kind =
+      held.kind == InstrumentKind::burr ? "drill" : std::string(EnumNames<InstrumentKind>::values[static_cast<std::size_t>(held.kind)]);
+  return "the " + kind + (head || held.kind != InstrumentKind::burr ? "" : "'s shaft");
+}
+
+InstrumentPlace place_of(const TickRecord& t) {
+  return {&instrument_of(t.device.tool), from_floats(t.device.position_mm) + from_floats(t.shown_offset_mm),
+          normalized(from_floats(t.device.axis))};
+}
+
+}  // namespace
+
+std::optional<ToolTouch::Told> ToolTouch::look(std::span<const TickRecord> hands) {
+  double least = 1e9;
+  std::optional<Told> told;
+  at_mm_.reset();
+  for (std::size_t a = 0; a < hands.size(); ++a) {
+    for (std::size_t b = a + 1; b < hands.size(); ++b) {
+      if (((hands[a].flags | hands[b].flags) & kPlateInHand) != 0) continue;
+      const InstrumentPlace first = place_of(hands[a]), other = place_of(hands[b]);
+      const InstrumentGap gap = gap_between(first, other);
+      if (gap.gap_mm >= least) continue;
+      least = gap.gap_mm;
+      if (gap.gap_mm >= 0) continue;
+      at_mm_ = gap.at_mm;
+      const auto rounded = [](double x) { return std::round(x * 100) / 100; };
+      told = Told{name_of(*other.held, gap.other_head) + " touches " + name_of(*first.held, gap.first_head),
+                  Json{{"hands", Json{static_cast<int>(hands[a].hand), static_cast<int>(hands[b].hand)}},
+                       {"tools", Json{first.held->name, other.held->name}},
+                       {"at_mm", Json{rounded(gap.at_mm.x), rounded(gap.at_mm.y), rounded(gap.at_mm.z)}}}
+                      .dump()};
+    }
+  }
+  if (least > kApartMm) told_ = false;
+  if (!told || told_) return std::nullopt;
+  told_ = true;
+  return told;
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,31 @@
+// That two hands' instruments touch each other: told once when it begins, shown where, and kept as a note. No physics: they pass through.
+// Private to libs/app/window.
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+
+#include "osteo/simulation/bone/instrument_gap.h"
+#include "osteo/simulation/haptics/stream.h"
+
+namespace osteo::inline app {
+
+class ToolTouch {
+ public:
+  /// Their gap must have been so wide since the last touch before another is told: a hand trembles.
+  static constexpr double kApartMm = 0.5;
+  struct Told {
+    std::string words;  ///< "the sucker touches the drill's shaft"
+    std::string note;   ///< the value of a "touch" note
+  };
+  /// The hands as they are, empty ones left out. Something when a touch begins.
+  std::optional<Told> look(std::span<const TickRecord> hands);
+  /// Where they touch now.
+  [[nodiscard]] std::optional<Vec3> at_mm() const { return at_mm_; }
+
+ private:
+  std::optional<Vec3> at_mm_;
+  bool told_ = false;
+};
+
+}  // namespace osteo::app

@@ -1,0 +1,35 @@
+#include "tool_wheel.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace osteo::inline app {
+
+std::span<const WheelItem> wheel_items() {
+  static constexpr WheelItem kItems[] = {{"cutting", Command::cutting}, {"diamond", Command::diamond},   {"ball", Command::ball},
+                                         {"taper", Command::taper},     {"cylinder", Command::cylinder}, {"plate", Command::plates},
+                                         {"pieces", Command::pieces},   {"saw", Command::saw},           {"drill", Command::put_away}};
+  return kItems;
+}
+
+void ToolWheel::show(float x, float y) {
+  open_ = true;
+  x_ = x;
+  y_ = y;
+  chosen_ = -1;
+}
+
+void ToolWheel::point(float right_em, float down_em) {
+  if (std::hypot(right_em, down_em) < kInnerEm) return;
+  const auto count = static_cast<float>(wheel_items().size());
+  const float turns = std::atan2(right_em, -down_em) / (2 * std::numbers::pi_v<float>);
+  const auto sector = static_cast<int>(std::lround(turns * count));
+  chosen_ = (sector + static_cast<int>(count)) % static_cast<int>(count);
+}
+
+void ToolWheel::turn(int items) {
+  const auto count = static_cast<int>(wheel_items().size());
+  chosen_ = chosen_ < 0 ? (items > 0 ? 0 : count - 1) : (chosen_ + items % count + count) % count;
+}
+
+}  // namespace osteo::app

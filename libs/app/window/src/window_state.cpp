@@ -1,0 +1,125 @@
+#include "window_state.h"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace osteo::inline app {
+namespace {
+
+nlohmann::ordered_json list(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+
+}  // namespace
+
+void write_window_state(const WindowState& s, const std::filesystem::path& file) {
+  static constexpr const char* kHands[] = {"drill", "saw", "piece", "plate"};
+  nlohmann::ordered_json places = nlohmann::ordered_json::array();
+  for (const Vec3 p : s.places_mm) places.push_back(list(p));
+  const Vec3 force = from_floats(s.tick.force_n);
+  const nlohmann::ordered_json j{{"pictures", s.pictures},
+                                 {"drawn", s.drawn},
+                                 {"at_rest", s.at_rest},
+                                 {"scale", s.scale},
+                                 {"quality", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.wish())]},
+                                 {"level", EnumNames<Quality>::values[static_cast<std::size_t>(s.quality.level())]},
+                                 {"moving_ms", s.quality.moving_ms()},
+                                 {"resting_ms", s.quality.resting_ms()},
+                                 {"failure", s.failure},
+                                 {"message", s.message},
+                                 {"leading", s.leading},
+                                 {"session", s.session.string()},
+                                 {"tool", s.tool},
+                                 {"drill_latched", s.drill_latched},
+                                 {"help", s.help},
+                                 {"sucking", s.sucking},
+                                 {"washing", s.washing},
+                                 {"sound", s.sound},
+                                 {"monitor",
+                                  {{"channels", s.monitor.channels},
+                                   {"events", s.monitor.events},
+                                   {"seconds", s.monitor.seconds},
+                                   {"shown", s.monitor.shown},
+                                   {"muted", s.monitor.muted}}},
+                                 {"tutor",
+                                  {{"title", s.tutor.title},
+                                   {"invitation", s.tutor.invitation},
+                                   {"links", s.tutor.links},
+                                   {"heard", s.tutor.heard},
+                                   {"guiding", s.tutor.guiding},
+                                   {"pull", s.tutor.pull},
+                                   {"apart_mm", s.tutor.apart_mm}}},
+                                 {"hand", kHands[s.hand]},
+                                 {"cut_in_middle", s.cut_in_middle},
+                                 {"cuts_along_tool", s.cuts_along_tool},
+                                 {"cuts_ms", s.cuts_ms},
+                                 {"cut_at_mm", list(s.cut.at_mm)},
+                                 {"cut_normal", list(s.cut.normal)},
+                                 {"cut_along", list(s.cut.along)},
+                                 {"plate_x", list(s.plate.rotation.column[0])},
+                                 {"eye", list(s.eye)},
+                                 {"centre_mm", list(s.centre_mm)},
+                                 {"radius_mm", s.radius_mm},
+                                 {"goal_mm", list(s.goal_mm)},
+                                 {"focus_mm", list(s.view.focus_mm)},
+                                 {"view_back", list(s.view.back)},
+                                 {"view_up", list(s.view.up)},
+                                 {"working_distance_mm", s.view.working_distance_mm},
+                                 {"magnification", s.view.magnification},
+                                 {"pixels_per_mm", s.pixels_per_mm},
+                                 {"camera_moves", s.camera_moves},
+                                 {"stereo", s.stereo},
+                                 {"size", {s.width, s.height}},
+                                 {"tick", s.tick.tick},
+                                 {"at_mm", list(from_floats(s.tick.device.position_mm))},
+                                 {"axis", list(from_floats(s.tick.device.axis))},
+                                 {"drill_on", s.tick.device.pedal != 0},
+                                 {"force_n", length(force)},
+                                 {"removed_mm3", s.removed_mm3},
+                                 {"hottest_c", s.hottest_c},
+                                 {"bodies", s.bodies},
+                                 {"fixtures", s.fixtures},
+                                 {"undo_steps", s.undo_steps},
+                                 {"places_mm", places},
+                                 {"layout", s.room.layout},
+                                 {"em_pixels", s.room.em_pixels},
+                                 {"full_screen", s.room.full_screen},
+                                 {"asking", s.room.asking},
+                                 {"wheel", s.room.wheel},
+                                 {"panel_keys", s.room.panel_keys},
+                                 {"before", s.room.before},
+                                 {"writing", s.room.writing},
+                                 {"ended", s.room.ended},
+                                 {"ruler", s.room.ruler},
+                                 {"ruler_mm", s.room.ruler_mm},
+                                 {"notes", s.room.notes},
+                                 {"findings", s.room.findings},
+                                 {"hints", s.room.hints},
+                                 {"hint", s.room.hint},
+                                 {"timeline", s.room.timeline},
+                                 {"playing", s.room.playing},
+                                 {"review_s", s.room.review_s},
+                                 {"review_mm3", s.room.review_mm3},
+                                 {"steps_done", s.room.steps_done},
+                                 {"next_step", s.room.next_step},
+                                 {"help_page", s.room.help_page},
+                                 {"help_pages", s.room.help_pages},
+                                 {"view", s.room.view},
+                                 {"one_to", s.motion.one_to},
+                                 {"clutch", s.motion.clutch},
+                                 {"wrist_rest", s.motion.wrist_rest},
+                                 {"left_handed", s.motion.left_handed},
+                                 {"listening", s.motion.listening},
+                                 {"page_row", s.motion.row},
+                                 {"burr_share", s.motion.burr_share},
+                                 {"tilted_rad", s.motion.tilted_rad},
+                                 {"second_mm", list(s.motion.second_mm)},
+                                 {"axis_wanted", list(s.motion.axis)}};
+  const std::filesystem::path beside = file.string() + ".new";
+  std::ofstream(beside) << j.dump() << '\n';
+  std::error_code ignored;
+  std::filesystem::rename(beside, file, ignored);
+}
+
+}  // namespace osteo::app

@@ -1,0 +1,66 @@
+#include "work_done.h"
+
+#include <cstdio>
+
+#include "osteo/simulation/bone/instrument.h"
+#include "state_facts.h"
+
+namespace osteo::inline app {
+namespace {
+
+template <class... A>
+std::string text_of(const char* format, A... a) {
+  char out[160];
+  std::snprintf(out, sizeof out, format, a...);
+  return out;
+}
+
+}  // namespace
+
+void WorkDone::action(const SceneAction& action) {
+  if (static_cast<ActionKind>(action.kind) == ActionKind::saw) ++cuts_;
+  if (static_cast<ActionKind>(action.kind) == ActionKind::undo) ++undone_;
+}
+
+void WorkDone::tick(const TickRecord& record, std::span<const VoxelChange>) {
+  if (record.speed_rpm <= 0 && record.removed_mm3 <= 0) return;
+  ByTool& tool = by_tool_[record.device.tool];
+  if (record.speed_rpm > 0) ++tool.ticks_turning;
+  tool.removed_mm3 += static_cast<double>(record.removed_mm3);
+}
+
+EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
+  EndFacts out;
+  const auto add = [&](std::string what, std::string value, Nearness nearness = Nearness::unknown) {
+    out.lines.push_back({std::move(what), std::move(value), nearness});
+  };
+  add("time", clock_text(session.seconds));
+  if (session.score) add("score", *session.score);
+  add("bone drilled away", text_of("%.1f mm3", session.removed_mm3));
+  for (const auto& [tool, done] : work.by_tool()) {
+    add("    " + instrument_of(tool).name,
+        text_of("%.1f mm3 in ", done.removed_mm3) + clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz));
+  }
+  if (work.undone() > 0) add("taken back", text_of("%zu", work.undone()));
+  if (work.cuts() > 0 || session.sawn_mm3 > 0) add("saw cuts", text_of("%zu, %.1f mm3", work.cuts(), session.sawn_mm3));
+  if (session.tissue_mm3 > 0) add("soft tissue cut off", text_of("%.1f mm3", session.tissue_mm3));
+  if (session.bodies > 1) add("pieces of bone", text_of("%zu", session.bodies));
+  for (const std::string& p : session.plates) add("plate", p);
+  if (session.has_structures && session.structures.empty()) add("structures at risk", "none came near", Nearness::far);
+  for (const SessionFacts::Structure& s : session.structures) {
+    if (s.injured_s > 0) {
+      add(s.name, text_of("INJURED: touched by the turning burr for %.2f s", s.injured_s), Nearness::touched);
+    } else if (s.touched_s > 0) {
+      add(s.name, text_of("touched for %.2f s, drill off", s.touched_s), Nearness::close);
+    } else {
+      add(s.name, text_of("never nearer than %.1f mm", s.least_clearance_mm),
+          s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
+    }
+  }
+  out.warnings = session.warnings;
+  out.folder = session.folder;
+  out.past = session.past;
+  return out;
+}
+
+}  // namespace osteo::app

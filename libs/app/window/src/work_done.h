@@ -1,0 +1,44 @@
+// What was done in a session, by tool: a reader of its stream. Private to libs/app/window.
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "osteo/session/scene/reader.h"
+#include "osteo/app/window/rehearsal_window.h"
+#include "palette.h"
+
+namespace osteo::inline app {
+
+class WorkDone final : public Reader {
+ public:
+  struct ByTool {
+    std::uint64_t ticks_turning = 0;
+    double removed_mm3 = 0;
+  };
+  void resync(const World&) override {}
+  void action(const SceneAction& action) override;
+  void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
+  [[nodiscard]] const std::map<std::uint8_t, ByTool>& by_tool() const { return by_tool_; }
+  [[nodiscard]] std::size_t cuts() const { return cuts_; }
+  [[nodiscard]] std::size_t undone() const { return undone_; }
+
+ private:
+  std::map<std::uint8_t, ByTool> by_tool_;
+  std::size_t cuts_ = 0, undone_ = 0;
+};
+
+/// A line of the page at the end.
+struct EndLine {
+  std::string what, value;
+  Nearness nearness = Nearness::unknown;  ///< of a structure; else unknown
+};
+struct EndFacts {
+  std::vector<EndLine> lines;
+  std::vector<std::string> warnings;
+  std::filesystem::path folder;
+  bool past = false;  ///< it was over before the window opened
+};
+[[nodiscard]] EndFacts end_facts(const SessionFacts& session, const WorkDone& work);
+
+}  // namespace osteo::app

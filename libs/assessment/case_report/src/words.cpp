@@ -1,0 +1,297 @@
+#include "words.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/param.h"
+
+namespace osteo::inline assessment::case_report {
+namespace {
+
+const Json* at(const Json* json, std::string_view key) {
+  return json == nullptr ? nullptr : json->find(key);
+}
+double number(const Json* json, double otherwise = 0) {
+  return json == nullptr ? otherwise : json->number().value_or(otherwise);
+}
+std::string text(const Json* json) {
+  return json == nullptr || json->text() == nullptr ? std::string() : *json->text();
+}
+
+Json read_json(const fs::path& path) {
+  return output_exists(path) ? Json::parse(read_text(path)).value_or(Json()) : Json();
+}
+
+// "0.45 x 0.45 x 1 mm"
+std::string edges_text(const Json* three) {
+  if (three == nullptr || three->items().size() != 3) return "not known";
+  std::string all;
+  for (const Json& v : three->items()) all += (all.empty() ? "" : " x ") + number_text(v.number().value_or(0), 2);
+  return all + " mm";
+}
+
+// "left, back, head" for LPS: where the three axes of the voxels go.
+std::string axes_text(const std::string& letters) {
+  std::string words;
+  for (const char c : letters) {
+    const char* word = c == 'L'   ? "left"
+                       : c == 'R' ? "right"
+                       : c == 'A' ? "front"
+                       : c == 'P' ? "back"
+                       : c == 'I' ? "feet"
+                       : c == 'S' ? "head"
+                                  : nullptr;
+    if (word == nullptr) return letters;
+    words += (words.empty() ? "to the " : ", ") + std::string(word);
+  }
+  return words + " (" + letters + ")";
+}
+
+}  // namespace
+
+CaseFacts::CaseFacts(const fs::path& folder)
+    : manifest_(read_json(folder / "manifest.json")), verdict_(read_json(folder / "import.json")) {}
+
+const Json* CaseFacts::verdict(std::string_view a, std::string_view b) const {
+  const Json* const first = verdict_.find(a);
+  return b.empty() ? first : at(first, b);
+}
+
+const Json* CaseFacts::step(std::string_view stage) const {
+  const Json* const steps = manifest_.find("steps");
+  if (steps == nullptr) return nullptr;
+  for (const Json& s : steps->items()) {
+    if (text(s.find("stage")) == stage) return &s;
+  }
+  return nullptr;
+}
+
+std::optional<double> CaseFacts::reported(std::string_view stage, std::string_view key) const {
+  const Json* const value = at(at(step(stage), "report"), key);
+  return value == nullptr ? std::nullopt : value->number();
+}
+std::string CaseFacts::reported_text(std::string_view stage, std::string_view key) const {
+  return text(at(at(step(stage), "report"), key));
+}
+std::string CaseFacts::param(std::string_view stage, std::string_view key) const {
+  return text(at(at(step(stage), "params"), key));
+}
+
+std::string number_text(double value, int decimals) {
+  const double scale = std::pow(10, decimals);
+  return format_number(std::round(value * scale) / scale);
+}
+
+std::string volume_text(double mm3) {
+  if (std::abs(mm3) < 10) return number_text(mm3, 1) + " mm3";
+  if (std::abs(mm3) < 1000) return number_text(mm3, 0) + " mm3";
+  const double cm3 = mm3 / 1000;
+  return number_text(cm3, cm3 < 10 ? 2 : cm3 < 100 ? 1 : 0) + " cm3";
+}
+
+sheet::Band verdict_band(const CaseFacts& f) {
+  const std::string status = text(f.verdict("status"));
+  std::string first;
+  const Json* const findings = f.verdict("findings");
+  std::size_t warnings = 0;
+  if (findings != nullptr) {
+    for (const Json& e : findings->items()) {
+      if (text(e.find("severity")) != "warning") continue;
+      ++warnings;
+      if (first.empty()) first = text(e.find("message"));
+    }
+  }
+  if (status == "good" && text(f.verdict("source")) == "DICOM")
+    return {"Good", "Every slice was taken as the scanner stored it; nothing was guessed, moved or left out.", Tone::good};
+  if (status == "good")
+    return {"Good", "Values and places are as the file has them; what was done to the scan before is not known.", Tone::good};
+  if (status == "repaired") {
+    std::string said = first.empty() ? "Slices were resampled onto upright, even ones." : first;
+    if (warnings > 1) said += " And " + std::to_string(warnings - 1) + (warnings == 2 ? " more note, below." : " more notes, below.");
+    return {"Repaired", said, Tone::caution};
+  }
+  return {"Not known", "This case holds no verdict of its import.", Tone::caution};
+}
+
+std::vector<sheet::Paragraph> verdict_notes(const CaseFacts& f) {
+  std::vector<sheet::Paragraph> notes;
+  const Json* const findings = f.verdict("findings");
+  if (findings == nullptr) return notes;
+  bool first = true;
+  constexpr std::size_t kMost = 8;
+  for (const char* const wanted : {"warning", "info"}) {
+    for (const Json& e : findings->items()) {
+      const std::string severity = text(e.find("severity")), advice = text(e.find("advice"));
+      if (severity != wanted || notes.size() >= kMost) continue;
+      const bool in_band = severity == "warning" && std::exchange(first, false);
+      if (in_band && advice.empty()) continue;
+      notes.push_back({(in_band ? std::string() : text(e.find("message")) + (advice.empty() ? "" : " ")) + advice,
+                       severity == "warning" ? Tone::caution : Tone::plain});
+    }
+  }
+  return notes;
+}
+
+Rows scan_rows(const CaseFacts& f) {
+  Rows rows;
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) rows.emplace_back(name, value);
+  };
+  const bool dicom = text(f.verdict("source")) == "DICOM";
+  if (dicom) {
+    const std::string modality = text(f.verdict("series", "modality")), kernel = text(f.verdict("series", "kernel")),
+                      scanner = text(f.verdict("series", "scanner"));
+    add("Scan", (modality == "CT" ? "CT" : modality) + (scanner.empty() ? "" : ", " + scanner) +
+                    (kernel.empty() ? ", kernel not stated" : ", kernel " + kernel));
+    const double usual = number(f.verdict("geometry", "gap_usual_mm")), least = number(f.verdict("geometry", "gap_min_mm")),
+                 most = number(f.verdict("geometry", "gap_max_mm"));
+    std::string slices = number_text(number(f.verdict("geometry", "slices")), 0) + " of " +
+                         number_text(number(f.verdict("geometry", "columns")), 0) + " x " +
+                         number_text(number(f.verdict("geometry", "rows")), 0);
+    const double thickness = number(f.verdict("series", "thickness_mm"));
+    if (thickness > 0) slices += ", " + number_text(thickness, 2) + " mm thick";
+    add("Slices", slices);
+    add("Distance", most - least > 0.02 ? number_text(least, 2) + " to " + number_text(most, 2) + " mm, mostly " + number_text(usual, 2)
+                                        : number_text(usual, 2) + " mm, even");
+    const Json* const pixel = f.verdict("geometry", "pixel_mm");
+    if (pixel != nullptr && pixel->items().size() == 2)
+      add("Pixel",
+          number_text(pixel->items()[0].number().value_or(0), 3) + " x " + number_text(pixel->items()[1].number().value_or(0), 3) + " mm");
+    const double tilt = number(f.verdict("geometry", "tilt_deg"));
+    if (std::abs(tilt) >= 0.05) add("Gantry tilt", number_text(std::abs(tilt), 1) + " degrees");
+    const Json* const resampled = f.verdict("geometry", "resampled");
+    const bool was = resampled != nullptr && resampled->flag() != nullptr && *resampled->flag();
+    const double off = number(f.verdict("geometry", "position_error_mm"));
+    add("Resampling", was ? "yes, onto upright even slices" : "none");
+    add("Placing", off < 0.005 ? "exact to 0.01 mm" : "a pixel is at most " + number_text(off, 2) + " mm off");
+  } else {
+    add("Scan", "a volume file: of scanner, kernel and slices nothing is known");
+    const Json* const dims = f.verdict("output", "dims");
+    if (dims != nullptr && dims->items().size() == 3)
+      add("Voxels", number_text(dims->items()[0].number().value_or(0), 0) + " x " + number_text(dims->items()[1].number().value_or(0), 0) +
+                        " x " + number_text(dims->items()[2].number().value_or(0), 0));
+  }
+  const Json* const made = f.verdict("geometry", "resampled");
+  add(made != nullptr && made->flag() != nullptr && *made->flag() ? "Voxel, resampled" : "Voxel of the scan",
+      edges_text(f.verdict("output", "spacing_mm")));
+  if (const std::string axes = text(f.verdict("output", "axes")); !axes.empty()) add("Axes", axes_text(axes));
+  if (const std::string given = f.param("import", "axes"); !given.empty())
+    add("Orientation", "given by hand as " + given + ": the file does not know it");
+  if (f.verdict("values") != nullptr)
+    add("Values", number_text(number(f.verdict("values", "hu_min")), 0) + " to " + number_text(number(f.verdict("values", "hu_max")), 0) +
+                      " HU" +
+                      (f.verdict("values", "air_hu") != nullptr && f.verdict("values", "air_hu")->number()
+                           ? "; air at " + number_text(number(f.verdict("values", "air_hu")), 0)
+                           : ""));
+  if (const std::string offset = f.param("import", "hu_offset"); !offset.empty() && offset != "0")
+    add("Offset", offset + " HU were added by hand");
+  return rows;
+}
+
+Rows bone_rows(const CaseFacts& f) {
+  Rows rows;
+  const std::string region = f.param("crop", "region"), preset = f.param("threshold", "preset");
+  if (!region.empty()) {
+    std::string name = region;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    rows.emplace_back("Region", name == "whole" ? "the whole scan" : name == "box" ? "a box, chosen by hand" : name);
+  }
+  if (const auto lower = f.reported("threshold", "lower_hu")) {
+    rows.emplace_back("Threshold", number_text(*lower, 0) + " HU" +
+                                       (preset.empty() || preset == "fixed" ? ", given" : ", found for " + preset + " bone"));
+    if (const auto change = f.reported("threshold", "change_percent_per_50_hu"))
+      rows.emplace_back("", "50 HU more or less change the volume by " + number_text(*change, *change < 9.95 ? 1 : 0) + " %");
+    if (const auto sure = f.reported("threshold", "confidence"); sure && *sure < 0.7)
+      rows.emplace_back("", *sure < 0.4 ? "Poor: bone and tissue are hard to tell apart" : "Fair: look at the outline");
+  }
+  if (const auto volume = f.reported("resample", "volume_after_mm3")) {
+    rows.emplace_back("Bone", volume_text(*volume));
+    const Json* const dims = f.verdict("output", "dims");
+    const Json* const spacing = f.verdict("output", "spacing_mm");
+    // Of a whole scan only: what a slice of a head holds on average (libs/imaging/image, bone_threshold: up to 45 cm2; a pelvis 60).
+    if (region == "whole" && dims != nullptr && spacing != nullptr && dims->items().size() == 3 && spacing->items().size() == 3) {
+      const double height = dims->items()[2].number().value_or(0) * spacing->items()[2].number().value_or(0);
+      const double cm2 = height > 0 ? *volume / height / 100 : 0;
+      rows.emplace_back(
+          "", number_text(cm2, 1) + " cm2 in a slice on average; a head has up to 45" + (cm2 > 45 ? ": LOOK AT THE OUTLINE" : ""));
+    } else {
+      rows.emplace_back("", "no usual range known for this region");
+    }
+    if (const auto change = f.reported("resample", "volume_change_percent"))
+      rows.emplace_back("Against the mask", std::abs(*change) < 0.05 ? "less than 0.1 % apart" : number_text(*change, 1) + " %");
+  }
+  if (const Json* const spacing = at(f.manifest().find("frame"), "spacing_mm")) rows.emplace_back("Voxel of the case", edges_text(spacing));
+  return rows;
+}
+
+Rows removed_rows(const CaseFacts& f) {
+  Rows rows;
+  const std::string table = f.reported_text("threshold", "table");
+  if (!table.empty()) {
+    rows.emplace_back("Table, holder", table);
+  } else if (const auto outside = f.reported("threshold", "outside_body_mm3")) {
+    rows.emplace_back("Table, holder", *outside > 0 ? volume_text(*outside) + " taken off" : "none found");
+  } else {
+    rows.emplace_back("Table, holder", "not looked for");
+  }
+  const auto found = f.reported("threshold", "pieces_found"), kept = f.reported("threshold", "pieces_kept");
+  if (found && kept) {
+    const double dropped = *found - *kept;
+    std::string said = dropped > 0 ? number_text(dropped, 0) + " of " + number_text(*found, 0) + " dropped" : "none dropped";
+    if (const auto mm3 = f.reported("threshold", "small_pieces_mm3"); mm3 && dropped > 0) said += ", " + volume_text(*mm3) + " together";
+    const std::string least = f.param("threshold", "min_volume_mm3"), largest = f.param("threshold", "keep_largest");
+    if (!least.empty()) said += "; each below " + least + " mm3";
+    if (!largest.empty() && largest != "0") said += ", or not among the " + largest + " largest";
+    rows.emplace_back("Small pieces", said);
+  }
+  if (const Json* const metal = f.verdict("values", "metal_mm3")) {
+    const double mm3 = number(metal);
+    std::string said = mm3 > 0 ? volume_text(mm3) + " of very bright voxels (fillings, implants)" : "none";
+    if (const auto streaks = f.reported("threshold", "streaks_mm3")) {
+      said += "; " + volume_text(*streaks) + " of streaks cleared near it";
+    } else if (mm3 > 0) {
+      said += "; streaks near it are kept";
+    }
+    rows.emplace_back("Metal", said);
+    if (number(f.verdict("values", "saturated_mm3")) > 0)
+      rows.emplace_back("", volume_text(number(f.verdict("values", "saturated_mm3"))) + " lie at the scanner's highest value");
+  }
+  return rows;
+}
+
+sheet::Table resolution_table(const CaseFacts& f) {
+  sheet::Table t;
+  t.head = {"small structure", "size", "voxels across", "so in this scan"};
+  t.widths = {30, 12, 18, 40};
+  const Json* const spacing = f.verdict("output", "spacing_mm");
+  if (spacing == nullptr || spacing->items().size() != 3) return t;
+  double finest = 1e30, coarsest = 0;
+  for (const Json& v : spacing->items()) {
+    finest = std::min(finest, v.number().value_or(1));
+    coarsest = std::max(coarsest, v.number().value_or(1));
+  }
+  // What the scanner took, not what was interpolated between: the widest distance of slices, or their thickness where that is more.
+  if (text(f.verdict("source")) == "DICOM")
+    coarsest = std::max({coarsest, number(f.verdict("geometry", "gap_max_mm")), number(f.verdict("series", "thickness_mm"))});
+  // Slices further apart than a structure is wide hide it where it runs within them, however fine their pixels.
+  constexpr std::pair<const char*, double> kSmall[] = {
+      {"mandibular canal", 2.5}, {"facial canal", 1.3}, {"tegmen, sinus plate", 1.0}, {"wall of an air cell, chorda", 0.5}};
+  for (const auto& [name, mm] : kSmall) {
+    const double least = mm / coarsest, most = mm / finest;
+    const bool shown = least >= 2, partly = least >= 1;
+    const std::string across = most - least < 0.15 ? number_text(least, 1) : number_text(least, 1) + " to " + number_text(most, 1);
+    t.rows.push_back({{name, Tone::plain},
+                      {number_text(mm, 1) + " mm", Tone::plain},
+                      {across, Tone::plain},
+                      {shown    ? "shown; its walls to about half a voxel"
+                       : partly ? "seen, but its walls may have holes or be too thick"
+                                : "not to be relied on: it may be missing",
+                       shown    ? Tone::good
+                       : partly ? Tone::caution
+                                : Tone::bad}});
+  }
+  return t;
+}
+
+}  // namespace osteo::assessment::case_report

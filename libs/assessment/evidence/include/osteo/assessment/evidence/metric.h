@@ -1,0 +1,93 @@
+// What a metric is told of a session, and what it tells.
+#pragma once
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "osteo/simulation/bone/structure_map.h"
+#include "osteo/simulation/bone/world.h"
+#include "osteo/assessment/evidence/procedure.h"
+#include "osteo/simulation/haptics/stream.h"
+#include "osteo/session/recording/session_file.h"
+
+namespace osteo::inline assessment {
+
+/// From where the bone was looked at, as a "camera" note has it.
+struct CameraPose {
+  std::uint64_t tick = 0;
+  Vec3 eye_mm, target_mm;
+};
+/// Of all "camera" notes, by tick. One that cannot be read is counted in `unreadable`.
+[[nodiscard]] std::vector<CameraPose> camera_poses(std::span<const Note> notes, std::size_t& unreadable);
+
+/// At most a tenth of a second, as session files keep it: they have of each voxel only the last density in it. Frames begin where a tick's
+/// number is a multiple of a tenth of a second, at an action that parts changes (parts_changes), and behind gaps; so live and from a file
+/// they are the same.
+struct EvidenceFrame {
+  double rate_hz = 1000;
+  std::span<const SceneAction> actions;  ///< in their order; done before the changes
+  std::span<const TickRecord> ticks;     ///< of all hands
+  std::span<const VoxelChange> changes;  ///< by the burrs: ascending names, each once; `before` is the density as the frame began
+  std::span<const VoxelChange> sawn;     ///< by a saw at the frame's beginning; names as in `changes`
+  const World& world;                    ///< as the frame left it
+  const CameraPose* camera = nullptr;    ///< the last before the frame's end; null where nothing was noted
+  std::uint64_t lost_before = 0;         ///< ticks that are not known between the frame before and this one
+};
+
+enum class Better { higher, lower, neither };
+[[nodiscard]] std::string_view name_of(Better better);
+
+/// The declaration of a metric: all that lines, columns, JSON and the table in docs/evidence.md need to know of it.
+struct MetricRow {
+  std::string_view name;  ///< lower case; unit at its end where it has one
+  std::string_view unit;  ///< "1": a share or a count
+  Better better;
+  std::string_view needs;   ///< "": nothing but the ticks; else "camera", "structures", "procedure", "reference"
+  std::string_view source;  ///< where it is from
+  std::string_view help;    ///< one phrase
+};
+[[nodiscard]] std::span<const MetricRow> metric_table();
+/// A defect in the program where there is none.
+[[nodiscard]] const MetricRow& metric_row(std::string_view name);
+
+/// One value, or a word on why there is none.
+struct Measured {
+  const MetricRow* row = nullptr;
+  std::string of;  ///< a structure, an instrument, a region; empty: of the whole session
+  std::optional<double> value;
+  std::string word;  ///< why there is no value; empty where there is
+  [[nodiscard]] std::string name() const { return of.empty() ? std::string(row->name) : std::string(row->name) + "[" + of + "]"; }
+};
+[[nodiscard]] Measured measured(std::string_view name, double value, std::string of = {});
+[[nodiscard]] Measured not_measured(std::string_view name, std::string why, std::string of = {});
+
+/// Something that happened at a time and place: for whoever wants to look at it.
+struct Moment {
+  double t_s = 0;
+  Vec3 at_mm;
+  std::string what;
+  std::string structure;
+  double value = 0, limit = 0;
+};
+
+/// What is known of the scene besides its bone; must outlive the metrics.
+struct EvidenceScene {
+  double rate_hz = 1000;
+  const StructureMap* structures = nullptr;
+  const Procedure* procedure = nullptr;
+};
+
+/// One of the readers that together make a score. Frames in order; then finish(), once.
+class Metric {
+ public:
+  virtual ~Metric() = default;
+  virtual void frame(const EvidenceFrame& frame) = 0;
+  /// `world`: as the session left it.
+  virtual void finish(const World& world, std::vector<Measured>& values, std::vector<Moment>& moments) = 0;
+};
+
+}  // namespace osteo::assessment

@@ -1,0 +1,242 @@
+#include "osteo/assessment/evidence/procedure.h"
+
+#include <algorithm>
+#include <set>
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+#include "osteo/core/base/json.h"
+
+namespace osteo::inline assessment {
+namespace {
+
+using Keys = std::vector<std::string>;
+
+// What an item of each kind goes by, besides name, kind, threshold and spread.
+Keys keys_of(ItemKind kind) {
+  switch (kind) {
+    case ItemKind::exposed:
+      return {"structure", "towards", "within_deg", "cover_mm"};
+    case ItemKind::not_violated:
+      return {"structure"};
+    case ItemKind::no_hole:
+      return {"structure", "towards", "within_deg"};
+    case ItemKind::no_cells_left:
+      return {"structure", "cells", "within_mm"};
+    case ItemKind::no_overhang:
+      return {"structure", "towards", "within_deg", "within_mm"};
+    case ItemKind::thinned:
+      return {"structure", "towards", "within_deg", "most"};
+    case ItemKind::sharp_angle:
+      return {"structure", "second", "within_mm"};
+    case ItemKind::followed:
+      return {"structure", "cover_mm"};
+    case ItemKind::margin:
+      return {"curve_mm", "most"};
+    case ItemKind::pieces:
+      return {"most"};
+    case ItemKind::fixed:
+      return {};
+  }
+  return {};
+}
+
+class Reading {
+ public:
+  Reading(std::string_view json, const std::string& name) : file_(json, name) { out_.file = name; }
+
+  Procedure read() {
+    const JsonValue& root = file_.root();
+    file_.require_format("osteotome_procedure");
+    const Keys known{"osteotome_procedure", "$schema",      "name",  "about", "usual_s", "structures", "regions",
+                     "instruments",         "force_limits", "items", "steps"};
+    file_.allow(root, "", known);
+    out_.name = file_.text(file_.need(root, "", "name"), "name");
+    if (const JsonValue* v = root.find("about")) out_.about = file_.text(*v, "about");
+    if (const JsonValue* v = root.find("usual_s")) out_.usual_s = file_.number(*v, "usual_s", 1, 1e5);
+    list(root, "structures", out_.structures, [&](auto& s, const std::string&, const JsonValue& v) {
+      if (declared(s.name)) throw file_.wrong(v, "structure '" + s.name + "' is there twice");
+    });
+    const auto of_structure = [&](auto& r, const std::string& where, const JsonValue& v) { known_structure(r.structure, where, v); };
+    list(root, "regions", out_.regions, of_structure);
+    list(root, "instruments", out_.instruments, of_structure);
+    list(root, "force_limits", out_.force_limits, of_structure);
+    items(root);
+    steps(root);
+    return std::move(out_);
+  }
+
+ private:
+  bool declared(const std::string& name) const { return out_.find(name) != nullptr; }
+  void known_structure(const std::string& name, const std::string& where, const JsonValue& at) const {
+    if (declared(name)) return;
+    Keys all;
+    for (const auto& s : out_.structures) all.push_back(s.name);
+    const std::string near = nearest_name(name, all);
+    throw file_.wrong(at, where + ": '" + name + "' is not among the structures",
+                      near.empty() ? "list it under \"structures\", with its role" : "did you mean '" + near + "'?");
+  }
+  // "item 3 ('sinus shown')": the name where there is one.
+  static std::string called(const std::string& what, std::size_t n, const JsonValue& v) {
+    std::string where = what + " " + std::to_string(n + 1);
+    if (const JsonValue* const name = v.find("name"); name != nullptr && name->kind == JsonValue::Kind::text)
+      where += " ('" + name->text + "')";
+    return where;
+  }
+  template <class T>
+  void list(const JsonValue& root, const std::string& key, std::vector<T>& into, const auto& check) {
+    const JsonValue* const all = root.find(key);
+    if (all == nullptr) return;
+    const std::string what = key.substr(0, key.size() - 1);
+    for (std::size_t n = 0; n < file_.list(*all, key).size(); ++n) {
+      const JsonValue& v = all->items[n];
+      const std::string where = called(what == "instrument" ? "instrument rule" : what, n, v);
+      T t;
+      file_.read(v, where, fields_of<T>(t));
+      t.line = v.line;
+      check(t, where, v);
+      into.push_back(std::move(t));
+    }
+  }
+  void items(const JsonValue& root) {
+    const JsonValue* const all = root.find("items");
+    if (all == nullptr) return;
+    std::set<std::string> names;
+    for (std::size_t n = 0; n < file_.list(*all, "items").size(); ++n) {
+      const JsonValue& v = all->items[n];
+      const std::string where = called("item", n, v);
+      ScaleItem item;
+      const Keys curve{"curve_mm"};
+      file_.read(v, where, fields_of<ScaleItem>(item), curve);
+      item.line = v.line;
+      if (!names.insert(item.name).second) throw file_.wrong(v, where + ": there are two of this name");
+      const std::string kind(EnumNames<ItemKind>::values[static_cast<std::size_t>(item.kind)]);
+      Keys allowed = keys_of(item.kind);
+      for (const char* const k : {"name", "kind", "threshold", "spread"}) allowed.emplace_back(k);
+      for (const JsonMember& m : v.members) {
+        if (std::find(allowed.begin(), allowed.end(), m.key) == allowed.end())
+          throw file_.wrong(m.value, where + ": '" + m.key + "' says nothing for an item of kind '" + kind + "'");
+      }
+      const auto needs = [&](const char* key) {
+        if (std::find(allowed.begin(), allowed.end(), key) != allowed.end() && v.find(key) == nullptr)
+          throw file_.wrong(v, where + ": '" + std::string(key) + "' is missing");
+      };
+      for (const char* const k : {"structure", "second", "cells", "curve_mm"}) needs(k);
+      for (const std::string& s : {item.structure, item.second, item.cells}) {
+        if (!s.empty()) known_structure(s, where, v);
+      }
+      if (const JsonValue* const c = v.find("curve_mm")) {
+        for (const JsonValue& p : file_.list(*c, "curve_mm")) {
+          Vec3 at;
+          for (std::size_t a = 0; a < 3; ++a) at[a] = file_.number(file_.list(p, "a point of curve_mm", 3)[a], "curve_mm", -1e4, 1e4);
+          item.curve_mm.push_back(at);
+        }
+        if (item.curve_mm.size() < 2) throw file_.wrong(*c, where + ": 'curve_mm' needs two points at least");
+      }
+      if (v.find("threshold") == nullptr) item.threshold = usual_threshold(item.kind);
+      if (v.find("spread") == nullptr) item.spread = usual_spread(item.kind);
+      if (v.find("most") == nullptr) item.most = item.kind == ItemKind::thinned ? 2.5 : item.kind == ItemKind::margin ? 3 : 1e6;
+      out_.items.push_back(std::move(item));
+    }
+  }
+  void steps(const JsonValue& root) {
+    const JsonValue* const all = root.find("steps");
+    if (all == nullptr) return;
+    const Keys known{"name", "items"};
+    for (std::size_t n = 0; n < file_.list(*all, "steps").size(); ++n) {
+      const JsonValue& v = all->items[n];
+      const std::string where = called("step", n, v);
+      file_.allow(v, where, known);
+      ProcedureStep step{file_.text(file_.need(v, where, "name"), "name"), {}};
+      if (const JsonValue* const items = v.find("items")) {
+        for (const JsonValue& i : file_.list(*items, "items")) {
+          const std::string& item = file_.text(i, "items");
+          if (std::none_of(out_.items.begin(), out_.items.end(), [&](const ScaleItem& s) { return s.name == item; }))
+            throw file_.wrong(i, where + ": '" + item + "' is no item");
+          step.items.push_back(item);
+        }
+      }
+      out_.steps.push_back(std::move(step));
+    }
+  }
+
+  JsonFile file_;
+  Procedure out_;
+};
+
+}  // namespace
+
+const ProcedureStructure* Procedure::find(std::string_view structure) const {
+  const auto s = std::find_if(structures.begin(), structures.end(), [&](const ProcedureStructure& p) { return p.name == structure; });
+  return s == structures.end() ? nullptr : &*s;
+}
+
+Procedure parse_procedure(std::string_view json, const std::string& name) {
+  return Reading(json, name).read();
+}
+
+Procedure load_procedure(const std::filesystem::path& file) {
+  return parse_procedure(read_text(file), file.filename().string());
+}
+
+Procedure mirrored(Procedure p) {
+  for (ScaleItem& i : p.items) {
+    i.towards[0] = -i.towards[0];
+    for (Vec3& q : i.curve_mm) q.x = -q.x;
+  }
+  return p;
+}
+
+// Starting values, to be fitted on rated cases: docs/evidence.md says where they are from.
+double usual_threshold(ItemKind kind) {
+  switch (kind) {
+    case ItemKind::exposed:
+      return 0.6;
+    case ItemKind::no_hole:
+      return 1;
+    case ItemKind::no_cells_left:
+      return 0.05;
+    case ItemKind::no_overhang:
+      return 0.95;
+    case ItemKind::thinned:
+      return 1.5;
+    case ItemKind::sharp_angle:
+      return 2;
+    case ItemKind::followed:
+      return 0.7;
+    case ItemKind::margin:
+      return 2;
+    case ItemKind::pieces:
+      return 2;
+    case ItemKind::fixed:
+      return 1;
+    case ItemKind::not_violated:
+      return 0;
+  }
+  return 0;
+}
+
+double usual_spread(ItemKind kind) {
+  switch (kind) {
+    case ItemKind::exposed:
+    case ItemKind::followed:
+      return 0.15;
+    case ItemKind::no_hole:
+      return 0.5;
+    case ItemKind::no_cells_left:
+    case ItemKind::no_overhang:
+      return 0.05;
+    case ItemKind::thinned:
+    case ItemKind::sharp_angle:
+    case ItemKind::margin:
+      return 0.5;
+    case ItemKind::pieces:
+    case ItemKind::fixed:
+      return 1;
+    case ItemKind::not_violated:
+      return 0.1;
+  }
+  return 1;
+}
+
+}  // namespace osteo::assessment

@@ -1,0 +1,48 @@
+#include "osteo/core/data/points_io.h"
+
+#include <charconv>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/files.h"
+
+namespace osteo {
+
+std::vector<Vec3> load_points(const fs::path& path) {
+  const std::vector<std::byte> bytes = read_file(path);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::vector<Vec3> points;
+  std::size_t line = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    std::size_t end = text.find('\n', at);
+    if (end == std::string_view::npos) end = text.size();
+    std::string row(text.substr(at, end - at));
+    at = end + 1;
+    ++line;
+    for (char& c : row) {
+      if (c == ',' || c == ';' || c == '\t' || c == '\r') c = ' ';
+    }
+    if (row.find_first_not_of(' ') == std::string::npos || row[row.find_first_not_of(' ')] == '#') continue;
+    Vec3 p;
+    const char* s = row.data();
+    const char* const last = row.data() + row.size();
+    bool good = true;
+    for (std::size_t a = 0; a < 3 && good; ++a) {
+      while (s < last && *s == ' ') ++s;
+      const auto [next, problem] = std::from_chars(s, last, p[a]);
+      good = problem == std::errc() && std::isfinite(p[a]);
+      s = next;
+    }
+    if (!good) {
+      if (line == 1) continue;  // a heading
+      throw Error(ExitCode::corrupt, "'" + path.string() + "', line " + std::to_string(line) + ": three finite numbers x, y, z are wanted");
+    }
+    points.push_back(p);
+  }
+  if (points.empty()) throw Error(ExitCode::no_input, "'" + path.string() + "' holds no points", "one point a line: x, y, z in LPS mm");
+  return points;
+}
+
+}  // namespace osteo

@@ -1,0 +1,156 @@
+#include "osteo/display/view/structures_view.h"
+
+#include <vtkActor.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkProperty.h>
+#include <vtkRenderer.h>
+#include <vtkShaderProperty.h>
+#include <vtkWindowedSincPolyDataFilter.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "osteo/core/base/parallel.h"
+#include "osteo/imaging/io/vtk_data.h"
+#include "osteo/display/view/actors.h"
+
+namespace osteo::inline display {
+
+namespace {
+
+void set_normals(TriMesh& mesh) {
+  std::vector<Vec3> normals(mesh.points_mm.size());
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = from_floats(mesh.points_mm[t[0]]), b = from_floats(mesh.points_mm[t[1]]), c = from_floats(mesh.points_mm[t[2]]);
+    const Vec3 twice_area = cross(b - a, c - a);
+    for (const std::uint32_t p : t) normals[p] += twice_area;
+  }
+  mesh.normals.resize(normals.size());
+  for (std::size_t p = 0; p < normals.size(); ++p) mesh.normals[p] = to_floats(normalized(normals[p]));
+}
+
+// Means over a point and those it shares triangles with, so often.
+template <class T>
+void spread(const TriMesh& mesh, std::vector<T>& values, int times) {
+  std::vector<T> sum(values.size());
+  std::vector<double> count(values.size());
+  for (int n = 0; n < times; ++n) {
+    std::fill(sum.begin(), sum.end(), T{});
+    std::fill(count.begin(), count.end(), 0);
+    for (const auto& t : mesh.triangles) {
+      const T all = values[t[0]] + values[t[1]] + values[t[2]];
+      for (const std::uint32_t p : t) {
+        sum[p] = sum[p] + all;
+        count[p] += 3;
+      }
+    }
+    for (std::size_t p = 0; p < values.size(); ++p) {
+      if (count[p] > 0) values[p] = sum[p] * (1 / count[p]);
+    }
+  }
+}
+
+// For each point how many hang together with it.
+std::vector<std::uint32_t> sizes_of_parts(const TriMesh& mesh) {
+  std::vector<std::uint32_t> root(mesh.points_mm.size()), size(root.size(), 0);
+  std::iota(root.begin(), root.end(), 0U);
+  const auto find = [&](std::uint32_t p) {
+    while (root[p] != p) p = root[p] = root[root[p]];
+    return p;
+  };
+  for (const auto& t : mesh.triangles) {
+    for (const std::uint32_t p : t) root[find(p)] = find(t[0]);
+  }
+  for (std::uint32_t p = 0; p < root.size(); ++p) ++size[find(p)];
+  std::vector<std::uint32_t> together(root.size());
+  for (std::uint32_t p = 0; p < root.size(); ++p) together[p] = size[find(p)];
+  return together;
+}
+
+}  // namespace
+
+TriMesh smooth_surface(const TriMesh& face, double most_mm) {
+  TriMesh smooth;
+  smooth.points_mm = face.points_mm;
+  smooth.triangles = face.triangles;
+  if (face.triangles.empty()) return smooth;
+  // A tube of few voxels is drawn in by the filter. What it lost is much the same all around, unlike the steps that were smoothed away:
+  // spread over the surface, that is given back. In rounds, each so weak that a tube two voxels thick is still a tube before it gets it
+  // back.
+  constexpr int kRounds = 3, kPasses = 30, kTimes = 2, kSpread = 20;
+  constexpr double kPassBand = 0.06;
+  std::vector<double> lost(smooth.points_mm.size());
+  for (int round = 0; round < kRounds; ++round) {
+    vtkNew<vtkWindowedSincPolyDataFilter> filter;
+    smooth.normals.clear();
+    filter->SetInputData(to_vtk(smooth));
+    filter->SetNumberOfIterations(kPasses);
+    filter->SetPassBand(kPassBand);
+    filter->BoundarySmoothingOff();
+    filter->FeatureEdgeSmoothingOff();
+    filter->NonManifoldSmoothingOn();
+    filter->NormalizeCoordinatesOn();
+    filter->Update();
+    for (std::size_t p = 0; p < smooth.points_mm.size(); ++p) {
+      double to[3];
+      filter->GetOutput()->GetPoints()->GetPoint(static_cast<vtkIdType>(p), to);
+      if (std::isfinite(to[0] + to[1] + to[2])) smooth.points_mm[p] = to_floats({to[0], to[1], to[2]});
+    }
+    for (int n = 0; n < kTimes; ++n) {
+      set_normals(smooth);
+      for (std::size_t p = 0; p < lost.size(); ++p)
+        lost[p] = dot(from_floats(face.points_mm[p]) - from_floats(smooth.points_mm[p]), from_floats(smooth.normals[p]));
+      spread(smooth, lost, kSpread);
+      for (std::size_t p = 0; p < lost.size(); ++p)
+        smooth.points_mm[p] = to_floats(from_floats(smooth.points_mm[p]) + from_floats(smooth.normals[p]) * lost[p]);
+    }
+  }
+  // A few voxels by themselves would be a point before it is given back what they lost: they stay as they are.
+  constexpr std::uint32_t kFewPoints = 60;
+  const std::vector<std::uint32_t> together = sizes_of_parts(face);
+  for (std::size_t p = 0; p < smooth.points_mm.size(); ++p) {
+    if (together[p] < kFewPoints) smooth.points_mm[p] = face.points_mm[p];
+    const Vec3 from = from_floats(face.points_mm[p]), by = from_floats(smooth.points_mm[p]) - from;
+    if (length(by) > most_mm) smooth.points_mm[p] = to_floats(from + by * (most_mm / length(by)));
+  }
+  set_normals(smooth);
+  return smooth;
+}
+
+StructuresView::StructuresView(vtkRenderer* renderer, const StructureMap& map) : renderer_(renderer), all_(map.values().size()) {
+  const double most_mm = map.label_spacing_mm()[1] / 2;
+  parallel_for(all_.size(), 1, 0, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) all_[s].surface = std::make_shared<const TriMesh>(smooth_surface(map.face(s), most_mm));
+  });
+  for (std::size_t s = 0; s < all_.size(); ++s) {
+    One& one = all_[s];
+    one.value = map.values()[s];
+    one.actor = make_bone_actor(to_vtk(*one.surface));
+    const auto c = map.colour_of(one.value);
+    one.actor->GetProperty()->SetColor(c[0], c[1], c[2]);
+    renderer_->AddActor(one.actor);
+  }
+}
+
+StructuresView::~StructuresView() {
+  for (const One& one : all_) renderer_->RemoveActor(one.actor);
+}
+
+void StructuresView::show(std::size_t number, StructureLook look) {
+  One& one = all_[number];
+  if (one.look == look) return;
+  one.look = look;
+  one.actor->SetVisibility(look != StructureLook::hidden ? 1 : 0);
+  one.actor->GetShaderProperty()->ClearAllFragmentShaderReplacements();
+  if (look != StructureLook::clear) return;
+  // Any two of them leave a quarter of the pixels to what lies behind both.
+  static constexpr const char* kPatterns[] = {"x + y", "x / 2 + y", "x + y / 2", "x / 2 + y / 2"};
+  const std::string discard = "//VTK::Light::Impl\n  { int x = int(gl_FragCoord.x), y = int(gl_FragCoord.y); if (((" +
+                              std::string(kPatterns[number % 4]) + ") & 1) != 0) discard; }\n";
+  one.actor->GetShaderProperty()->AddFragmentShaderReplacement("//VTK::Light::Impl", true, discard, false);
+}
+
+}  // namespace osteo::display

@@ -1,0 +1,129 @@
+#include "osteo/geometry/distance/compare.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/parallel.h"
+#include "osteo/geometry/distance/triangle_tree.h"
+
+namespace osteo::inline geometry {
+namespace {
+
+struct Piece {
+  Vec3 a, b, c;
+  double upper;         // no point of it is farther than this
+  std::uint64_t order;  // ties
+  friend bool operator<(const Piece& x, const Piece& y) { return x.upper != y.upper ? x.upper < y.upper : x.order > y.order; }
+};
+
+OneWayDistance one_way(const TriangleSoup& from, const TriangleTree& to, double extent, const Context& context) {
+  OneWayDistance result;
+  const std::size_t n = from.triangles.size();
+  std::vector<double> area(n);
+  double total = 0;
+  const auto corner = [&](std::size_t t, std::size_t i) { return from.points_mm[from.triangles[t][i]]; };
+  for (std::size_t t = 0; t < n; ++t) {
+    area[t] = length(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0))) / 2;
+    total += area[t];
+  }
+  // About 200,000 samples, at least one a triangle, each standing for its share of the triangle's area.
+  std::vector<std::uint32_t> count(n);
+  std::vector<std::size_t> first(n + 1, 0);
+  for (std::size_t t = 0; t < n; ++t) {
+    count[t] = 1 + (total > 0 ? static_cast<std::uint32_t>(std::min(1e6, area[t] / total * 200000)) : 0);
+    first[t + 1] = first[t] + count[t];
+  }
+  std::vector<std::pair<double, double>> samples(first[n]);  // distance, weight
+  std::vector<Piece> pieces(n);
+  parallel_for(n, 512, context.threads, [&](std::size_t begin, std::size_t end) {
+    context.check_cancelled();
+    std::uint32_t hint = ClosestPoint::kNone;
+    for (std::size_t t = begin; t < end; ++t) {
+      const Vec3 a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
+      for (std::uint32_t s = 0; s < count[t]; ++s) {
+        // A low-discrepancy sequence (R2: the plastic number), folded into the triangle.
+        double u = std::fmod(0.5 + 0.7548776662466927 * s, 1.0), v = std::fmod(0.5 + 0.5698402909980532 * s, 1.0);
+        if (count[t] == 1) u = v = 1.0 / 3;
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        const ClosestPoint p = to.closest(a + (b - a) * u + (c - a) * v, hint);
+        hint = p.triangle;
+        samples[first[t] + s] = {p.distance_mm, area[t] / count[t]};
+      }
+      const Vec3 m = (a + b + c) / 3;
+      const ClosestPoint p = to.closest(m, hint);
+      const double reach = std::max({length(a - m), length(b - m), length(c - m)});
+      pieces[t] = {a, b, c, p.distance_mm + reach, t};
+    }
+  });
+  double sum = 0, squares = 0, weight = 0;
+  for (const auto& [d, w] : samples) {
+    sum += d * w;
+    squares += d * d * w;
+    weight += w;
+  }
+  result.samples = samples.size();
+  if (weight > 0) {
+    result.mean_mm = sum / weight;
+    result.rms_mm = std::sqrt(squares / weight);
+  }
+  std::sort(samples.begin(), samples.end());
+  double passed = 0;
+  for (const auto& [d, w] : samples) {
+    passed += w;
+    result.p95_mm = d;
+    if (passed >= 0.95 * weight) break;
+  }
+  result.max_mm = -1;
+  const auto offer = [&](Vec3 x) {
+    const ClosestPoint p = to.closest(x);
+    if (p.distance_mm > result.max_mm) {
+      result.max_mm = p.distance_mm;
+      result.worst_mm = x;
+    }
+    return p.distance_mm;
+  };
+  const double tolerance = 1e-4 * extent;
+  std::priority_queue<Piece> queue(std::less<Piece>(), std::move(pieces));
+  std::uint64_t questions = 0, order = n;
+  while (!queue.empty() && queue.top().upper > result.max_mm + tolerance && questions < 200000) {
+    if ((questions & 1023U) == 0) context.check_cancelled();
+    const Piece q = queue.top();
+    queue.pop();
+    // Corners first: an extreme is usually there. Then four triangles.
+    for (const Vec3 x : {q.a, q.b, q.c}) offer(x);
+    const Vec3 ab = (q.a + q.b) * 0.5, bc = (q.b + q.c) * 0.5, ca = (q.c + q.a) * 0.5;
+    const std::array<std::array<Vec3, 3>, 4> parts{{{q.a, ab, ca}, {ab, q.b, bc}, {ca, bc, q.c}, {ab, bc, ca}}};
+    for (const auto& part : parts) {
+      const Vec3 m = (part[0] + part[1] + part[2]) / 3;
+      const double d = offer(m);
+      const double upper = std::min(q.upper, d + std::max({length(part[0] - m), length(part[1] - m), length(part[2] - m)}));
+      if (upper > result.max_mm + tolerance) queue.push({part[0], part[1], part[2], upper, order++});
+    }
+    questions += 7;
+  }
+  if (result.max_mm < 0) offer(corner(0, 0));
+  result.max_bound_mm = std::max(result.max_mm + tolerance, queue.empty() ? 0.0 : queue.top().upper);
+  return result;
+}
+
+}  // namespace
+
+SurfaceComparison compare_surfaces(const TriangleSoup& a, const TriangleSoup& b, const Context& context) {
+  const TriangleTree tree_a(a, context), tree_b(b, context);
+  BoxMm both = bounds_of(a);
+  const BoxMm other = bounds_of(b);
+  both.include(other.lo);
+  both.include(other.hi);
+  const double extent = length(both.hi - both.lo);
+  SurfaceComparison result;
+  context.progress(0.1, "comparing");
+  result.a_to_b = one_way(a, tree_b, extent, context);
+  context.progress(0.55);
+  result.b_to_a = one_way(b, tree_a, extent, context);
+  context.progress(1.0);
+  return result;
+}
+
+}  // namespace osteo::geometry

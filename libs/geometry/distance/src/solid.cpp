@@ -1,0 +1,172 @@
+#include "osteo/geometry/distance/solid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <tuple>
+
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/portable_math.h"
+#include "osteo/core/base/union_find.h"
+#include "osteo/geometry/distance/voxelize.h"
+
+namespace osteo::inline geometry {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+// Triangles with the same corners, as one.
+struct Layer {
+  Triangle corners;
+  int net;  // how many more face as `corners` does than the other way
+};
+
+std::vector<Layer> layers_of(const TriangleSoup& soup) {
+  std::vector<std::pair<Triangle, std::uint32_t>> by_corners;
+  for (std::uint32_t i = 0; i < soup.triangles.size(); ++i) {
+    Triangle key = soup.triangles[i];
+    if (key[0] == key[1] || key[1] == key[2] || key[2] == key[0]) continue;
+    std::sort(key.begin(), key.end());
+    by_corners.emplace_back(key, i);
+  }
+  std::sort(by_corners.begin(), by_corners.end());
+  std::vector<std::pair<std::uint32_t, int>> firsts;
+  for (std::size_t i = 0, j = 0; i < by_corners.size(); i = j) {
+    const Triangle& own = soup.triangles[by_corners[i].second];
+    int net = 0;
+    for (j = i; j < by_corners.size() && by_corners[j].first == by_corners[i].first; ++j) {
+      const Triangle& t = soup.triangles[by_corners[j].second];
+      const auto first = static_cast<std::size_t>(std::find(t.begin(), t.end(), own[0]) - t.begin());
+      net += t[(first + 1) % 3] == own[1] ? 1 : -1;
+    }
+    firsts.emplace_back(by_corners[i].second, net);
+  }
+  std::sort(firsts.begin(), firsts.end());
+  std::vector<Layer> layers;
+  for (const auto& [i, net] : firsts) layers.push_back({soup.triangles[i], net});
+  return layers;
+}
+
+// Of a triangle seen from p, over 4 pi; positive from behind. A. van Oosterom, J. Strackee 1983.
+double solid_angle(Vec3 a, Vec3 b, Vec3 c, Vec3 p) {
+  a = a - p;
+  b = b - p;
+  c = c - p;
+  const double la = length(a), lb = length(b), lc = length(c);
+  const double up = dot(a, cross(b, c)), down = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+  return up == 0 ? 0 : portable::atan2(up, down) / (2 * std::numbers::pi);
+}
+
+double divergence(const TriangleSoup& soup) {
+  if (soup.triangles.empty()) return 0;
+  const Vec3 about = soup.points_mm[soup.triangles[0][0]];
+  double sum = 0;
+  for (const auto& t : soup.triangles)
+    sum += dot(soup.points_mm[t[0]] - about, cross(soup.points_mm[t[1]] - about, soup.points_mm[t[2]] - about)) / 6;
+  return sum;
+}
+
+std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& context) {
+  SolidSurface result;
+  result.soup = welded(input);
+  // What no order closes is put in order first, or it would be as many patches as triangles.
+  if (!is_closed(result.soup)) result.soup = ordered(input, context).soup;
+  const auto& points = result.soup.points_mm;
+  const std::vector<Layer> layers = layers_of(result.soup);
+  const auto corner = [&](const Layer& s, std::size_t i) { return points[s.corners[i]]; };
+  // Patches: neighbours over edges of two that face the same way and lie on each other as often.
+  std::vector<std::uint32_t> parent(layers.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  struct Edge {
+    std::uint32_t a, b, layer;
+    bool forward;
+  };
+  std::vector<Edge> edges;
+  for (std::uint32_t s = 0; s < layers.size(); ++s) {
+    for (std::size_t e = 0; e < 3; ++e) {
+      const std::uint32_t u = layers[s].corners[e], v = layers[s].corners[(e + 1) % 3];
+      edges.push_back({std::min(u, v), std::max(u, v), s, u < v});
+    }
+  }
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b, x.layer) < std::tie(y.a, y.b, y.layer); });
+  for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
+    for (j = i + 1; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b;) ++j;
+    if (j - i == 2 && edges[i].forward != edges[i + 1].forward && layers[edges[i].layer].net == layers[edges[i + 1].layer].net)
+      join_sets(parent, edges[i].layer, edges[i + 1].layer);
+  }
+  std::map<std::uint32_t, std::pair<std::uint32_t, double>> largest;  // of each patch
+  for (std::uint32_t s = 0; s < layers.size(); ++s) {
+    const double area = length(cross(corner(layers[s], 1) - corner(layers[s], 0), corner(layers[s], 2) - corner(layers[s], 0)));
+    auto& [which, most] = largest.try_emplace(root_of(parent, s), s, -1.0).first->second;
+    if (area > most) which = s, most = area;
+  }
+  enum class Verdict : std::uint8_t { drop, keep, turn };
+  std::map<std::uint32_t, Verdict> of_patch;
+  for (const auto& [patch, found] : largest) {
+    context.check_cancelled();
+    const Layer& own = layers[found.first];
+    const Vec3 p = corner(own, 0) * 0.37 + corner(own, 1) * 0.33 + corner(own, 2) * 0.30;
+    double others = 0;
+    for (std::uint32_t s = 0; s < layers.size(); ++s) {
+      if (s != found.first && layers[s].net != 0)
+        others += layers[s].net * solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
+    }
+    const double behind = others + own.net / 2.0, before = others - own.net / 2.0;
+    const auto inside = [](double w) { return std::abs(w) > 0.5; };
+    of_patch[patch] = inside(behind) == inside(before) ? Verdict::drop : inside(behind) ? Verdict::keep : Verdict::turn;
+  }
+  result.soup.triangles.clear();
+  for (std::uint32_t s = 0; s < layers.size(); ++s) {
+    Triangle t = layers[s].corners;
+    const Verdict v = of_patch.at(root_of(parent, s));
+    if (v == Verdict::drop) {
+      ++result.buried;
+      continue;
+    }
+    if (v == Verdict::turn) {
+      std::swap(t[1], t[2]);
+      ++result.turned;
+    }
+    result.soup.triangles.push_back(t);
+  }
+  if (result.soup.triangles.empty()) return std::nullopt;
+  return result;
+}
+
+}  // namespace
+
+SolidSurface solid_surface(const TriangleSoup& soup, const Context& context) {
+  require_sound(soup);
+  if (auto found = solid_of(soup, context)) return *std::move(found);
+  throw Error(ExitCode::failed, "the surface encloses nothing: everywhere its winding number is the same on both sides",
+              "a sheet has no inside; 'osteo mesh-info' tells what the surface is");
+}
+
+double inside_volume_mm3(const TriangleSoup& soup, const Context& context) {
+  require_sound(soup);
+  const auto [lo, hi] = bounds_of(soup);
+  const Vec3 size = hi - lo;
+  const double extent = std::max({size.x, size.y, size.z});
+  if (!(extent > 0)) return 0;
+  const Frame frame = frame_around(soup, 200, 1);
+  InsideReport report;
+  const VoxelBits bits = voxels_inside(soup, frame, context, &report);
+  const TriangleSoup whole = welded(soup);
+  if (!is_closed(whole)) return static_cast<double>(bits.count()) * frame.voxel_volume_mm3();
+  const auto solid = solid_of(soup, context);
+  if (!solid) return 0;
+  // The divergence theorem counts a place as often as the surface winds about it. What that is too much is counted in voxels, so that only
+  // it is as coarse as these, and nothing where nothing overlaps.
+  // A surface that was sound is not counted again.
+  InsideReport of_solid = report;
+  const bool untouched = solid->buried == 0 && solid->turned == 0 && solid->soup.triangles.size() == whole.triangles.size();
+  const bool same = untouched || voxels_inside(solid->soup, frame, context, &of_solid).words == bits.words;
+  const TriangleSoup& used = same ? solid->soup : whole;
+  return divergence(used) - static_cast<double>(same ? of_solid.surplus : report.surplus) * frame.voxel_volume_mm3();
+}
+
+}  // namespace osteo::geometry

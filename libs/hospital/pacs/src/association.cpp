@@ -1,0 +1,245 @@
+#include "association.h"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <exception>
+#include <fstream>
+#include <new>
+
+#include "dcmtk/dcmdata/dcuid.h"
+
+namespace osteo::inline hospital::pacs {
+namespace {
+
+constexpr unsigned kDuplicate = 0x0111, kBadUid = 0x0117, kNoMatch = 0xA900, kNoRoom = 0xA700, kCannotUnderstand = 0xC000;
+
+void limit(int what, double most) {
+  rlimit r{};
+  getrlimit(what, &r);
+  r.rlim_cur = r.rlim_max = std::min(r.rlim_max, static_cast<rlim_t>(most));
+  setrlimit(what, &r);
+}
+
+// Of address space that this process has taken already: most of it libraries that were never touched.
+double taken_bytes() {
+  std::ifstream in("/proc/self/statm");
+  double pages = 0;
+  in >> pages;
+  return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
+}
+
+// The data sets of two files, without what a node may have written before them.
+bool same_data_set(const fs::path& a, const fs::path& b) {
+  const auto data = [](std::ifstream& in) {
+    std::array<unsigned char, 144> head{};
+    if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return false;
+    const std::uint64_t group = head[140] | head[141] << 8U | head[142] << 16U | static_cast<std::uint64_t>(head[143]) << 24U;
+    return static_cast<bool>(in.seekg(static_cast<std::streamoff>(group), std::ios::cur));
+  };
+  std::ifstream x(a, std::ios::binary), y(b, std::ios::binary);
+  if (!data(x) || !data(y)) return false;
+  std::array<char, 65536> p{}, q{};
+  do {
+    x.read(p.data(), p.size());
+    y.read(q.data(), q.size());
+    if (x.gcount() != y.gcount() || !std::equal(p.begin(), p.begin() + x.gcount(), q.begin())) return false;
+  } while (x && y);
+  return true;
+}
+
+struct Serving {
+  const fs::path& folder;
+  const ReceiveOptions& options;
+  SharedCounts& counts;
+  int pipe;
+  fs::path file;            // that is coming in
+  std::uint64_t bytes = 0;  // of its data set, so far
+};
+
+// An object that has come whole into `s.file`: into its place, or why not.
+unsigned keep(Serving& s, const T_DIMSE_C_StoreRQ& request) {
+  if (!is_uid(request.AffectedSOPInstanceUID) || !is_uid(request.AffectedSOPClassUID)) return kBadUid;
+  if (!holds_data_set(s.file, s.bytes)) return kNoRoom;
+  ObjectHead head;
+  if (!read_head(s.file, head)) return kCannotUnderstand;
+  if (!is_uid(head.study) || !is_uid(head.series)) return kBadUid;
+  if (head.sop_class != request.AffectedSOPClassUID || head.sop_instance != request.AffectedSOPInstanceUID) return kNoMatch;
+  const fs::path place = place_of(head), whole = s.folder / place;
+  std::error_code error;
+  fs::create_directories(whole.parent_path(), error);
+  if (error) return kNoRoom;
+  // A link fails where there is something, so that nothing is ever written over, whoever else receives it at this moment.
+  if (::link(s.file.c_str(), whole.c_str()) != 0) {
+    if (errno != EEXIST) return kNoRoom;
+    if (!same_data_set(s.file, whole)) return kDuplicate;
+    ++s.counts.again;
+    return STATUS_Success;
+  }
+  s.counts.folder_bytes += s.bytes;
+  s.counts.bytes += s.bytes;
+  ++s.counts.stored;
+  const std::string line = place.parent_path().string() + "\n";
+  [[maybe_unused]] const auto told = ::write(s.pipe, line.data(), line.size());
+  return STATUS_Success;
+}
+
+bool room(const Serving& s) {
+  struct statvfs disk {};
+  if (::statvfs(s.folder.c_str(), &disk) != 0) return false;
+  return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) > s.options.keep_free_gb * 1e9 &&
+         static_cast<double>(s.counts.folder_bytes) < s.options.folder_gb * 1e9;
+}
+
+void came(void* data, T_DIMSE_StoreProgress* progress, T_DIMSE_C_StoreRQ* request, char*, DcmDataset**, T_DIMSE_C_StoreRSP* response,
+          DcmDataset**) {
+  Serving& s = *static_cast<Serving*>(data);
+  if (progress->progressBytes > 0) s.bytes = static_cast<std::uint64_t>(progress->progressBytes);
+  if (progress->state != DIMSE_StoreEnd) return;
+  // Before this, DCMTK has set the status to what happened on the way.
+  if (response->DimseStatus == STATUS_Success) response->DimseStatus = static_cast<Uint16>(room(s) ? keep(s, *request) : kNoRoom);
+  if (response->DimseStatus != STATUS_Success) ++s.counts.refused;
+}
+
+OFCondition store(T_ASC_Association* association, T_ASC_PresentationContextID id, T_DIMSE_C_StoreRQ& request, Serving& s) {
+  char name[32];
+  static int number = 0;
+  std::snprintf(name, sizeof name, "%d-%d", ::getpid(), number++);
+  s.file = s.folder / kIncoming / name;
+  s.bytes = 0;
+  const int timeout = static_cast<int>(std::ceil(s.options.timeout_s));
+  const OFCondition done =
+      DIMSE_storeProvider(association, id, &request, s.file.c_str(), OFTrue, nullptr, came, &s, DIMSE_NONBLOCKING, timeout);
+  ::unlink(s.file.c_str());
+  return done;
+}
+
+void reject(T_ASC_Association* association, SharedCounts& counts, T_ASC_RejectParametersResult result, T_ASC_RejectParametersSource source,
+            T_ASC_RejectParametersReason reason) {
+  ++counts.refused_associations;
+  const T_ASC_RejectParameters why{result, source, reason};
+  ASC_rejectAssociation(association, &why);
+}
+
+// Whether the peer may come in; the answer is given.
+bool let_in(T_ASC_Association* association, const ReceiveOptions& options, SharedCounts& counts) {
+  char calling[65] = "", called[65] = "", responding[65] = "";
+  ASC_getAPTitles(association->params, calling, sizeof calling, called, sizeof called, responding, sizeof responding);
+  const auto title = [](const char* text) {
+    try {
+      return checked_ae(text);
+    } catch (const Error&) {
+      return std::string();
+    }
+  };
+  if (title(called) != options.ae) {
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED);
+    return false;
+  }
+  const std::string from = title(calling);
+  if (from.empty() || (!options.anybody && std::ranges::find(options.allowed, from) == options.allowed.end())) {
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED);
+    return false;
+  }
+  char context[129] = "";
+  ASC_getApplicationContextName(association->params, context, sizeof context);
+  if (std::string_view(context) != UID_StandardApplicationContext) {
+    reject(association, counts, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
+    return false;
+  }
+  // What a sender has is taken as it is: compressed forms first, so that nobody decodes for us.
+  const char* forms[] = {UID_JPEGProcess14SV1TransferSyntax,
+                         UID_JPEGProcess14TransferSyntax,
+                         UID_JPEGLSLosslessTransferSyntax,
+                         UID_JPEG2000LosslessOnlyTransferSyntax,
+                         UID_RLELosslessTransferSyntax,
+                         UID_JPEGProcess2_4TransferSyntax,
+                         UID_JPEGProcess1TransferSyntax,
+                         UID_JPEGLSLossyTransferSyntax,
+                         UID_JPEG2000TransferSyntax,
+                         UID_DeflatedExplicitVRLittleEndianTransferSyntax,
+                         UID_LittleEndianExplicitTransferSyntax,
+                         UID_BigEndianExplicitTransferSyntax,
+                         UID_LittleEndianImplicitTransferSyntax};
+  const char* echo[] = {UID_VerificationSOPClass};
+  const char* plain[] = {UID_LittleEndianExplicitTransferSyntax, UID_LittleEndianImplicitTransferSyntax};
+  OFCondition done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, echo, 1, plain, 2);
+  if (done.good())
+    done = ASC_acceptContextsWithPreferredTransferSyntaxes(association->params, dcmAllStorageSOPClassUIDs,
+                                                           numberOfDcmAllStorageSOPClassUIDs, forms, static_cast<int>(std::size(forms)));
+  return done.good() && ASC_acknowledgeAssociation(association).good();
+}
+
+}  // namespace
+
+fs::path place_of(const ObjectHead& head) {
+  return fs::path("study-" + hash_text(head.study).substr(0, 12)) / ("series-" + hash_text(head.series).substr(0, 12)) /
+         (hash_text(head.sop_instance).substr(0, 24) + ".dcm");
+}
+
+void serve(int connection, int pipe, const fs::path& folder, const ReceiveOptions& options, SharedCounts& counts) {
+  // A peer can end this process and nothing else. It ends at once: what the program does on its way out waits for threads that a child has
+  // not.
+  std::set_new_handler([] { ::_exit(5); });
+  std::set_terminate([] { ::_exit(6); });
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_FSIZE, options.object_gb * 1e9);
+  limit(RLIMIT_CPU, options.association_s);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  limit(RLIMIT_AS, taken_bytes() + options.memory_mb * 1e6);
+#endif
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGALRM, SIG_DFL);
+  ::alarm(static_cast<unsigned>(std::ceil(options.association_s)));
+  quiet_dcmtk(options.timeout_s);
+  const int timeout = static_cast<int>(std::ceil(options.timeout_s));
+  T_ASC_Network* network = nullptr;
+  T_ASC_Association* association = nullptr;
+  dcmExternalSocketHandle.set(connection);
+  if (ASC_initializeNetwork(NET_ACCEPTOR, 0, timeout, &network).bad()) ::_exit(3);
+  const std::unique_ptr<DcmTLSTransportLayer> layer = tls_layer(options.tls, NET_ACCEPTOR);
+  if (layer != nullptr && ASC_setTransportLayer(network, layer.get(), 0).bad()) ::_exit(3);
+  const OFBool secure = layer != nullptr ? OFTrue : OFFalse;
+  if (ASC_receiveAssociation(network, &association, ASC_DEFAULTMAXPDU, nullptr, nullptr, secure, DUL_NOBLOCK, timeout).bad()) {
+    ++counts.refused_associations;
+    ::_exit(2);
+  }
+  if (!let_in(association, options, counts)) ::_exit(2);
+  Serving s{folder, options, counts, pipe, {}, 0};
+  for (;;) {
+    T_DIMSE_Message message{};
+    T_ASC_PresentationContextID id = 0;
+    const OFCondition got = DIMSE_receiveCommand(association, DIMSE_NONBLOCKING, timeout, &id, &message, nullptr);
+    if (got == DUL_PEERREQUESTEDRELEASE) {
+      ASC_acknowledgeRelease(association);
+      ASC_dropSCPAssociation(association, 1);
+      ::_exit(0);
+    }
+    if (got == DUL_PEERABORTEDASSOCIATION) ::_exit(0);
+    OFCondition done = got;
+    if (got.good()) {
+      switch (message.CommandField) {
+        case DIMSE_C_ECHO_RQ:
+          done = DIMSE_sendEchoResponse(association, id, &message.msg.CEchoRQ, STATUS_Success, nullptr);
+          break;
+        case DIMSE_C_STORE_RQ:
+          done = store(association, id, message.msg.CStoreRQ, s);
+          break;
+        default:
+          done = DIMSE_BADCOMMANDTYPE;
+      }
+    }
+    if (done.bad()) {
+      ASC_abortAssociation(association);
+      ::_exit(4);
+    }
+  }
+}
+
+}  // namespace osteo::hospital::pacs

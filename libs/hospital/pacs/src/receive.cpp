@@ -1,0 +1,284 @@
+#include "osteo/hospital/pacs/receive.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <map>
+#include <new>
+
+#include "association.h"
+
+namespace osteo::inline hospital {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using pacs::SharedCounts;
+
+constexpr const char* kClosed = "CLOSED";
+
+struct Descriptor {
+  int value = -1;
+  Descriptor() = default;
+  explicit Descriptor(int fd) : value(fd) {}
+  Descriptor(Descriptor&& other) noexcept : value(std::exchange(other.value, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(value, other.value);
+    return *this;
+  }
+  ~Descriptor() {
+    if (value >= 0) ::close(value);
+  }
+};
+
+// Memory that children write and the parent reads.
+class SharedPage {
+ public:
+  SharedPage() {
+    void* const page = ::mmap(nullptr, sizeof(SharedCounts), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (page == MAP_FAILED) throw Error(ExitCode::resources, "no memory to count in");
+    counts_ = new (page) SharedCounts;
+  }
+  ~SharedPage() { ::munmap(counts_, sizeof(SharedCounts)); }
+  SharedPage(const SharedPage&) = delete;
+  SharedPage& operator=(const SharedPage&) = delete;
+  SharedCounts& operator*() const { return *counts_; }
+
+ private:
+  SharedCounts* counts_;
+};
+
+Descriptor listen_at(const ReceiveOptions& o, int& port) {
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_port = htons(static_cast<std::uint16_t>(o.port));
+  if (::inet_pton(AF_INET, o.address.c_str(), &at.sin_addr) != 1)
+    throw Error(ExitCode::usage, "'" + o.address + "' is no IPv4 address to listen on",
+                "127.0.0.1 for this machine alone, 0.0.0.0 for every network");
+  Descriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const int on = 1;
+  ::setsockopt(fd.value, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  socklen_t size = sizeof at;
+  if (fd.value < 0 || ::bind(fd.value, reinterpret_cast<sockaddr*>(&at), sizeof at) != 0 || ::listen(fd.value, 64) != 0 ||
+      ::getsockname(fd.value, reinterpret_cast<sockaddr*>(&at), &size) != 0)
+    throw Error(ExitCode::failed, "cannot listen on " + o.address + ":" + std::to_string(o.port) + ": " + std::strerror(errno),
+                "--port another, or stop what listens there");
+  port = ntohs(at.sin_port);
+  return fd;
+}
+
+void check(const ReceiveOptions& o) {
+  static_cast<void>(checked_ae(o.ae));
+  for (const std::string& title : o.allowed) static_cast<void>(checked_ae(title));
+  if (o.allowed.empty() && !o.anybody)
+    throw Error(ExitCode::usage, "nobody may send", "--allow TITLE,TITLE names the nodes that may; --anybody lets all in");
+  static_cast<void>(pacs::tls_layer(o.tls, NET_ACCEPTOR));  // what is wrong with its files is told now
+}
+
+struct Child {
+  pid_t pid = 0;
+  Descriptor pipe;
+  std::string rest;  // of a line
+};
+
+class Node {
+ public:
+  Node(fs::path folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context)
+      : folder_(std::move(folder)), options_(options), events_(events), context_(context) {
+    make_output_folder(folder_ / pacs::kIncoming);
+    for (const auto& left : fs::directory_iterator(folder_ / pacs::kIncoming)) fs::remove(left.path());  // of a process that died
+    for (const auto& study : fs::directory_iterator(folder_)) {
+      if (!study.is_directory() || !study.path().filename().string().starts_with("study-")) continue;
+      for (const auto& series : fs::directory_iterator(study.path())) {
+        if (!series.is_directory()) continue;
+        const ClosedSeries known = look(series.path());
+        (*counts_).folder_bytes += known.bytes;
+        if (known.objects > 0 && !fs::exists(series.path() / kClosed)) open_[series.path()] = Clock::now();
+      }
+    }
+    int port = 0;
+    listener_ = listen_at(options_, port);
+    if (events_.listening) events_.listening(port);
+  }
+  ~Node() {
+    for (const Child& c : children_) ::kill(c.pid, SIGKILL);
+    for (const Child& c : children_) ::waitpid(c.pid, nullptr, 0);
+  }
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+  void run() {
+    while (!context_.cancelled()) {
+      std::vector<pollfd> watched{{listener_.value, POLLIN, 0}};
+      for (const Child& c : children_) watched.push_back({c.pipe.value, POLLIN, 0});
+      ::poll(watched.data(), watched.size(), 200);
+      // Children before connections: accepting one changes their number.
+      for (std::size_t n = 0; n < children_.size(); ++n)
+        if (watched[n + 1].revents != 0) hear(children_[n]);
+      bury();
+      if ((watched[0].revents & POLLIN) != 0) accept();
+      close_quiet();
+      tell(false);
+    }
+    tell(true);
+  }
+
+ private:
+  static ClosedSeries look(const fs::path& series) {
+    ClosedSeries c{series, 0, 0};
+    for (const auto& file : fs::directory_iterator(series)) {
+      if (file.path().extension() != ".dcm") continue;
+      ++c.objects;
+      c.bytes += file.file_size();
+    }
+    return c;
+  }
+
+  void accept() {
+    Descriptor connection(::accept4(listener_.value, nullptr, nullptr, SOCK_CLOEXEC));
+    if (connection.value < 0) return;
+    ++seen_.associations;
+    if (children_.size() >= static_cast<std::size_t>(options_.most_associations)) {
+      // A-ASSOCIATE-RJ, rejected for now, by the provider, local limit exceeded (PS3.8 9.3.4): no process is made for it.
+      constexpr std::array<unsigned char, 10> kBusy{3, 0, 0, 0, 0, 4, 0, 2, 3, 2};
+      ::send(connection.value, kBusy.data(), kBusy.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      ++(*counts_).refused_associations;
+      return;
+    }
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) return;
+    Descriptor in(ends[0]), out(ends[1]);
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      ::close(listener_.value);
+      for (const Child& c : children_) ::close(c.pipe.value);
+      std::signal(SIGTERM, SIG_DFL);
+      std::signal(SIGINT, SIG_IGN);  // Ctrl-C is for the parent, which ends us
+      try {
+        pacs::serve(connection.value, out.value, folder_, options_, *counts_);
+      } catch (...) {  // a certificate that is being renewed, say: what stands below this child is its parent's
+        ::_exit(6);
+      }
+    }
+    if (pid < 0) {
+      ++(*counts_).refused_associations;
+      return;
+    }
+    ::fcntl(in.value, F_SETFL, O_NONBLOCK);
+    children_.push_back({pid, std::move(in), {}});
+  }
+
+  void hear(Child& child) {
+    char text[4096];
+    ssize_t n = 0;
+    while ((n = ::read(child.pipe.value, text, sizeof text)) > 0) child.rest.append(text, static_cast<std::size_t>(n));
+    // It has closed its end: it is going, and if it were stuck on its way nobody would come for it.
+    if (n == 0) ::kill(child.pid, SIGKILL);
+    for (std::size_t end = 0; (end = child.rest.find('\n')) != std::string::npos;) {
+      const fs::path series = folder_ / child.rest.substr(0, end);
+      child.rest.erase(0, end + 1);
+      open_[series] = Clock::now();
+      std::error_code error;
+      fs::remove(series / kClosed, error);
+    }
+  }
+
+  void bury() {
+    std::erase_if(children_, [&](Child& c) {
+      int status = 0;
+      if (::waitpid(c.pid, &status, WNOHANG) != c.pid) return false;
+      hear(c);
+      // 5, 6: out of memory, a fault that throws.
+      const bool faulted = WIFEXITED(status) && (WEXITSTATUS(status) == 5 || WEXITSTATUS(status) == 6);
+      if (faulted || (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL)) {
+        ++seen_.died;
+        context_.warn("the process of an association was ended by a limit or a fault");
+      }
+      // What it was writing.
+      const std::string mine = std::to_string(c.pid) + "-";
+      for (const auto& left : fs::directory_iterator(folder_ / pacs::kIncoming))
+        if (left.path().filename().string().starts_with(mine)) fs::remove(left.path());
+      return true;
+    });
+  }
+
+  void close_quiet() {
+    for (auto at = open_.begin(); at != open_.end();) {
+      if (std::chrono::duration<double>(Clock::now() - at->second).count() < options_.quiet_s) {
+        ++at;
+        continue;
+      }
+      const ClosedSeries closed = look(at->first);
+      at = open_.erase(at);
+      if (closed.objects == 0) continue;
+      write_file(closed.folder / kClosed, std::to_string(closed.objects) + " objects\n");
+      ++seen_.closed;
+      if (events_.closed) events_.closed(closed);
+    }
+  }
+
+  void tell(bool last) {
+    const SharedCounts& c = *counts_;
+    ReceiveCounters now = seen_;
+    now.refused_associations = c.refused_associations;
+    now.stored = c.stored;
+    now.again = c.again;
+    now.refused = c.refused;
+    now.bytes = c.bytes;
+    if (!last && (now == told_ || Clock::now() - told_at_ < std::chrono::seconds(1))) return;
+    told_ = now;
+    told_at_ = Clock::now();
+    if (events_.counters) events_.counters(now);
+  }
+
+  fs::path folder_;
+  const ReceiveOptions& options_;
+  const ReceiveEvents& events_;
+  const Context& context_;
+  SharedPage counts_;
+  Descriptor listener_;
+  std::vector<Child> children_;
+  std::map<fs::path, Clock::time_point> open_;  // series, and when something of them came
+  ReceiveCounters seen_, told_;
+  Clock::time_point told_at_{};
+};
+
+}  // namespace
+
+void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context) {
+  check(options);
+  try {
+    Node(folder, options, events, context).run();
+  } catch (const fs::filesystem_error& e) {
+    throw error_of(e);
+  }
+}
+
+std::string metrics_text(const ReceiveCounters& c) {
+  std::string text;
+  const auto row = [&](const char* name, const char* help, std::uint64_t value) {
+    const std::string full = std::string("osteotome_receive_") + name + "_total";
+    text += "# HELP " + full + " " + help + "\n# TYPE " + full + " counter\n" + full + " " + std::to_string(value) + "\n";
+  };
+  row("associations", "connections", c.associations);
+  row("refused_associations", "connections that were not let in", c.refused_associations);
+  row("died", "processes of associations ended by a limit or a fault", c.died);
+  row("stored", "objects stored", c.stored);
+  row("again", "objects that were there already", c.again);
+  row("refused", "objects refused", c.refused);
+  row("bytes", "bytes of data sets stored", c.bytes);
+  row("closed_series", "series closed after quiet", c.closed);
+  return text;
+}
+
+}  // namespace osteo::hospital

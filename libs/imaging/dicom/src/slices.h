@@ -1,0 +1,65 @@
+// Slices of a placement, read in parallel; and lattices sampled between them. Private to libs/imaging/dicom.
+#pragma once
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "osteo/core/base/context.h"
+#include "osteo/core/data/frame.h"
+#include "osteo/imaging/dicom/place.h"
+#include "pixels.h"
+
+namespace osteo::inline imaging::dicom {
+
+/// A file that could not be decoded.
+struct DamagedFile {
+  std::size_t header = 0;
+  std::string why;
+};
+
+class SliceReader {
+ public:
+  SliceReader(const std::vector<DicomHeader>& headers, const Placement& placement) : headers_(headers), placement_(placement) {}
+  /// Reads slices [begin, end) into out[slice]; throws DamagedFile for the first that cannot be read.
+  void read(std::size_t begin, std::size_t end, const std::vector<std::int16_t*>& out, const Context& context);
+  [[nodiscard]] const ValueCount& count() const { return count_; }
+
+ private:
+  const std::vector<DicomHeader>& headers_;
+  const Placement& placement_;
+  ValueCount count_;
+  std::map<std::size_t, std::vector<std::int16_t>> decoded_;  // compressed multi-frame files, kept
+};
+
+/// An upright lattice above the slices of a placement: linear along rows, columns and the normal, each slice where it lies.
+class SliceSampler {
+ public:
+  SliceSampler(const Placement& placement, int columns, int rows, const Frame& frame);
+  /// Slices [first, last] that layer z lies between.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> slices_of(int z) const;
+  /// One row of the lattice. slice(k) gives the pixels of slice k. Voxels that no measured pixel reaches become kNoValue.
+  struct Scratch {
+    std::vector<float> value, weight, sum, sum_weight;
+  };
+  void row(int y, int z, const std::vector<const std::int16_t*>& slices, std::int16_t* out, Scratch& scratch) const;
+
+ private:
+  struct Tap {
+    int index;
+    float fraction;
+  };
+  struct AlongRow {
+    std::vector<Tap> taps;  // one a column of the lattice; index -2 where no pixel is near
+    int begin = 0, end = 0;
+  };
+  [[nodiscard]] double along(int z) const { return along_first_ + z * frame_.spacing_mm.z; }
+
+  const Placement& placement_;
+  int columns_, rows_;
+  Frame frame_;
+  double along_first_ = 0, side_first_[2] = {};
+  std::vector<const AlongRow*> of_slice_;
+  std::map<long long, AlongRow> tables_;  // by sideways shift: slices that stand above each other share one
+};
+
+}  // namespace osteo::imaging::dicom

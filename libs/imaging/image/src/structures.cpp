@@ -1,0 +1,121 @@
+#include "osteo/imaging/image/structures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "osteo/core/base/error.h"
+
+namespace osteo::inline imaging {
+namespace {
+
+std::string trimmed(const std::string& text) {
+  const std::size_t a = text.find_first_not_of(" \t"), b = text.find_last_not_of(" \t");
+  return a == std::string::npos ? std::string() : text.substr(a, b - a + 1);
+}
+
+std::map<int, std::string> parse_names(const std::string& text) {
+  std::map<int, std::string> names;
+  std::string rest = text;
+  while (!trimmed(rest).empty()) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    const std::string item = trimmed(rest.substr(0, comma));
+    rest = comma < rest.size() ? rest.substr(comma + 1) : std::string();
+    const std::size_t equals = item.find('=');
+    const std::string value = trimmed(item.substr(0, equals));
+    const bool number = !value.empty() && value.find_first_not_of("0123456789") == std::string::npos && value.size() < 4;
+    const int v = number ? std::atoi(value.c_str()) : 0;
+    const std::string name = equals == std::string::npos ? std::string() : trimmed(item.substr(equals + 1));
+    if (v < 1 || v > 255 || name.empty()) {
+      throw Error(ExitCode::usage, "--names: '" + item + "' is not VALUE=NAME with a value from 1 to 255",
+                  "like --names '1=facial nerve, 2=sigmoid sinus'");
+    }
+    names[v] = name;
+  }
+  return names;
+}
+
+// Nerves yellow, arteries red, veins blue, as atlases have it; the rest in turn.
+std::array<std::uint8_t, 3> colour_for(const std::string& name, std::size_t n) {
+  const std::string low = lower_case(name);
+  const auto has = [&](const char* word) { return low.find(word) != std::string::npos; };
+  if (has("nerve") || has("nerv") || has("chorda")) return {244, 214, 49};
+  if (has("arter") || has("carotid")) return {216, 60, 50};
+  if (has("vein") || has("sinus") || has("jugular") || has("ven")) return {60, 110, 210};
+  if (has("bone") || has("ossicle") || has("malleus") || has("incus") || has("stapes")) return {241, 232, 210};
+  static constexpr std::array<std::array<std::uint8_t, 3>, 6> kTurn{
+      {{128, 174, 128}, {183, 156, 220}, {230, 150, 90}, {111, 184, 210}, {220, 130, 170}, {160, 160, 80}}};
+  return kTurn[n % kTurn.size()];
+}
+
+}  // namespace
+
+Labels name_structures(const Labels& labels, const StructuresParams& params, const Image* ct, const Context& context) {
+  const auto given = parse_names(params.names);
+  std::array<std::uint64_t, 256> count{}, inside{};
+  const Frame& f = labels.frame;
+  std::size_t at = 0;
+  for (int k = 0; k < f.dims[2]; ++k) {
+    for (int j = 0; j < f.dims[1]; ++j) {
+      for (int i = 0; i < f.dims[0]; ++i, ++at) {
+        const std::uint8_t v = labels.voxels[at];
+        if (v == 0) continue;
+        ++count[v];
+        if (ct == nullptr) continue;
+        const Vec3 x =
+            ct->frame.index_from_world(f.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)}));
+        bool in = true;
+        for (std::size_t a = 0; a < 3; ++a) in = in && x[a] > -0.5 && x[a] < ct->frame.dims[a] - 0.5;
+        inside[v] += in ? 1 : 0;
+      }
+    }
+  }
+  std::uint64_t all = 0, all_inside = 0;
+  for (std::size_t v = 1; v < 256; ++v) {
+    all += count[v];
+    all_inside += inside[v];
+  }
+  if (all == 0) throw Error(ExitCode::failed, "the label map is empty: no voxel is above 0");
+  if (ct != nullptr && all_inside == 0) {
+    throw Error(ExitCode::failed, "no labelled voxel lies inside the CT: the label map is of another scan, or its frame is wrong",
+                "'osteo info' shows where each lies (LPS mm)");
+  }
+  if (ct != nullptr && 2 * all_inside < all) context.warn("more than half of the labelled voxels lie outside the CT");
+  for (const auto& [value, name] : given) {
+    if (count[static_cast<std::size_t>(value)] == 0) context.warn("no voxel has the value " + std::to_string(value) + " (" + name + ")");
+  }
+  Labels result = labels;
+  result.structures.clear();
+  bool left_out = false;
+  for (std::size_t v = 1; v < 256; ++v) {
+    if (count[v] == 0) continue;
+    Structure s{static_cast<std::uint8_t>(v), "structure " + std::to_string(v), {}};
+    bool named = false;
+    for (const Structure& own : labels.structures) {
+      if (own.value == v) s = own;
+      named |= own.value == v;
+    }
+    if (const auto it = given.find(static_cast<int>(v)); it != given.end()) {
+      s.name = it->second;
+      named = true;
+    }
+    if (params.only_named && !named) {
+      count[v] = 0;
+      left_out = true;
+      continue;
+    }
+    if (s.rgb == std::array<std::uint8_t, 3>{}) s.rgb = colour_for(s.name, result.structures.size());
+    context.report(s.name + " mm3", static_cast<double>(count[v]) * f.voxel_volume_mm3());
+    result.structures.push_back(std::move(s));
+  }
+  if (result.structures.empty())
+    throw Error(ExitCode::failed, "no value of the label map has a name", "give --names, or leave --only-named out");
+  if (left_out) {
+    auto kept = make_voxels<std::uint8_t>(f.voxel_count());
+    for (std::size_t v = 0; v < f.voxel_count(); ++v) kept[v] = count[labels.voxels[v]] > 0 ? labels.voxels[v] : 0;
+    result.voxels = std::move(kept);
+  }
+  return result;
+}
+
+}  // namespace osteo::imaging

@@ -1,0 +1,382 @@
+// The external canal and the air behind the drum.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "ear_parts.h"
+#include "osteo/core/base/parallel.h"
+
+namespace osteo::inline imaging::segment {
+namespace {
+
+constexpr double kLeastBony = 0.5;
+constexpr double kOutsideBallMm = 8;                     // wider than the canal, narrower than what is outside
+constexpr double kCanalEnclosed = 0.75, kMouthMm = 2.5;  // where less of the round is wall, its mouth begins
+constexpr double kCavityMm3 = 60;  // the tympanic cavity below its ossicles has more; behind wax or a bend there is less
+
+/// Of air that runs inward, what is a tube: shells of equal way from its inner end have about the same area. Where they widen it opens into
+/// a fold of the skin; from there on only what lies straight on is kept.
+void keep_tube(const Field& f, Mask& mask, const std::vector<float>& to_outside) {
+  const std::size_t n = f.size();
+  float deepest = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (mask[i] != 0) deepest = std::max(deepest, to_outside[i]);
+  constexpr float kFar = std::numeric_limits<float>::max();
+  std::vector<float> way(n, kFar);
+  using Entry = std::pair<float, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (mask[i] == 0 || to_outside[i] < deepest - 1.5F) continue;
+    way[i] = 0;
+    queue.emplace(0.0F, i);
+  }
+  while (!queue.empty()) {
+    const auto [w, at] = queue.top();
+    queue.pop();
+    if (w > way[at]) continue;
+    const auto p = f.place(at);
+    for (int k = -1; k <= 1; ++k)
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) {
+          if (!f.inside(p[0] + i, p[1] + j, p[2] + k)) continue;
+          const std::size_t to = f.at(p[0] + i, p[1] + j, p[2] + k);
+          const auto step = static_cast<float>(f.h_mm * std::sqrt(static_cast<double>(i * i + j * j + k * k)));
+          if (mask[to] == 0 || w + step >= way[to]) continue;
+          way[to] = w + step;
+          queue.emplace(way[to], to);
+        }
+  }
+  struct Shell {
+    Vec3 sum;
+    double count = 0;
+  };
+  std::vector<Shell> shells;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (way[i] == kFar) continue;
+    const auto s = static_cast<std::size_t>(way[i]);
+    if (shells.size() <= s) shells.resize(s + 1);
+    const auto p = f.place(i);
+    shells[s].sum += f.world(p[0], p[1], p[2]);
+    shells[s].count += 1;
+  }
+  if (shells.size() < 10) return;
+  std::vector<double> areas;
+  for (std::size_t s = 3; s < std::min<std::size_t>(13, shells.size()); ++s) areas.push_back(shells[s].count);
+  std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
+  const double usual = areas[areas.size() / 2], radius = std::sqrt(usual * f.h_mm * f.h_mm * f.h_mm / 3.14159265358979);
+  std::size_t mouth = shells.size();
+  for (std::size_t s = 8; s + 1 < shells.size() && mouth == shells.size(); ++s)
+    if (shells[s].count > 1.5 * usual && shells[s + 1].count > 1.5 * usual) mouth = s;
+  const auto middle = [&](std::size_t s) { return shells[s].sum / std::max(1.0, shells[s].count); };
+  const std::size_t last = mouth - 1;
+  const Vec3 tip = middle(last), out = normalized(tip - middle(last > 6 ? last - 6 : 0));
+  for (std::size_t i = 0; i < n; ++i) {
+    if (mask[i] == 0) continue;
+    if (way[i] == kFar) {
+      mask[i] = 0;
+      continue;
+    }
+    const auto s = static_cast<std::size_t>(way[i]);
+    const auto p = f.place(i);
+    const Vec3 x = f.world(p[0], p[1], p[2]);
+    if (s < mouth) {
+      if (length(x - middle(s)) > 2.5 * radius + 1) mask[i] = 0;
+      continue;
+    }
+    const double on = dot(x - tip, out);
+    if (on < -1 || on > 14 || length(x - tip - out * on) > 1.3 * radius + 0.5) mask[i] = 0;
+  }
+}
+
+}  // namespace
+
+Canal find_canal(const Field& f, const Levels& levels, const Context& context) {
+  Canal c;
+  const std::size_t n = f.size();
+  Mask solid(n), air(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    air[i] = static_cast<double>(f.v[i]) < levels.air_below ? 1 : 0;
+    solid[i] = 1 - air[i];
+  }
+  // Outside: where a ball of air reaches that begins at the outer face of the image.
+  const std::vector<float> to_solid = distance_mm(f, solid, context);
+  Mask core(n);
+  for (std::size_t i = 0; i < n; ++i) core[i] = air[i] != 0 && static_cast<double>(to_solid[i]) > kOutsideBallMm ? 1 : 0;
+  const Pieces cores = pieces_of(f, core, true);
+  std::vector<std::uint8_t> outer(cores.size.size());
+  for (int k = 0; k < f.n[2]; ++k)
+    for (int j = 0; j < f.n[1]; ++j) outer[cores.of[f.at(f.n[0] - 1, j, k)]] = 1;
+  outer[0] = 0;
+  for (std::size_t i = 0; i < n; ++i) core[i] = outer[cores.of[i]];
+  c.exterior.assign(n, 0);
+  if (std::none_of(core.begin(), core.end(), [](std::uint8_t x) { return x != 0; })) {
+    c.why = "no air outside of the head on this side";
+    return c;
+  }
+  const std::vector<float> to_core = distance_mm(f, core, context);
+  for (std::size_t i = 0; i < n; ++i) c.exterior[i] = air[i] != 0 && static_cast<double>(to_core[i]) <= kOutsideBallMm + f.h_mm ? 1 : 0;
+  // Narrow air that opens to the outside, and goes deep into bone.
+  Mask narrow(n), bone(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    narrow[i] = air[i] != 0 && c.exterior[i] == 0 ? 1 : 0;
+    bone[i] = static_cast<double>(f.v[i]) > levels.bone_above ? 1 : 0;
+  }
+  const std::vector<float> to_outside = distance_mm(f, c.exterior, context), to_bone = distance_mm(f, bone, context);
+  const Pieces pieces = pieces_of(f, narrow, false);
+  std::vector<double> deep(pieces.size.size());
+  std::vector<std::uint8_t> opens(pieces.size.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t p = pieces.of[i];
+    if (p == 0) continue;
+    if (static_cast<double>(to_outside[i]) < 1.5 * f.h_mm) opens[p] = 1;
+    // Counts up to the length of a canal: cells behind a drum that is not seen must not decide.
+    const double away = static_cast<double>(to_outside[i]);
+    if (away > 6 && away < 30 && static_cast<double>(to_bone[i]) < 5.5) deep[p] += 1;
+  }
+  std::size_t best = 0;
+  for (std::size_t p = 1; p < deep.size(); ++p)
+    if (opens[p] != 0 && deep[p] > deep[best]) best = p;
+  const double voxel = f.h_mm * f.h_mm * f.h_mm;
+  if (best == 0 || deep[best] * voxel < 60) {
+    c.why = "no air goes from outside into bone on this side";
+    return c;
+  }
+  // Behind the drum: what can only be reached over a pass. The noise must not make one.
+  std::vector<float> height = smoothed(f.v, f.n, std::max(0.5, 0.5 / f.h_mm), context.threads);
+  std::vector<std::size_t> seeds;
+  for (std::size_t i = 0; i < n; ++i) {
+    height[i] = std::max(height[i], -1000.0F);
+    if (pieces.of[i] == best && static_cast<double>(to_outside[i]) < 1.5 * f.h_mm) seeds.push_back(i);
+  }
+  const std::vector<float> up = climbed(f, height, seeds, [&](std::size_t i) { return pieces.of[i] == best; });
+  const Pass pass = lowest_pass(f, height, up, std::max(25.0, 1.0 * levels.noise_hu), kCavityMm3);
+  const bool drum = pass.volume_mm3 > 0;
+  // Voxels at the walls are as high as a pass: they go with the nearest that are not.
+  Mask before(n), behind(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (pieces.of[i] != best) continue;
+    before[i] = !drum || static_cast<double>(up[i]) < pass.height ? 1 : 0;
+    behind[i] = drum && static_cast<double>(up[i]) >= pass.height && static_cast<double>(height[i]) < pass.height ? 1 : 0;
+  }
+  const std::vector<float> to_before = distance_mm(f, before, context), to_behind = distance_mm(f, behind, context);
+  // The folds of the auricle are open to more sides than a canal is.
+  Mask inner(n);
+  parallel_for(n, 1 << 12, context.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (pieces.of[i] != best || static_cast<double>(to_before[i]) > static_cast<double>(to_behind[i])) continue;
+      const auto p = f.place(i);
+      inner[i] = static_cast<double>(to_outside[i]) > 25 ||
+                         enclosure(f, f.world(p[0], p[1], p[2]), 14, [&](std::size_t q) { return air[q] != 0 ? 0 : 1; }) > kCanalEnclosed
+                     ? 1
+                     : 0;
+    }
+  });
+  const Pieces inners = pieces_of(f, inner, true);
+  std::vector<double> depth(inners.size.size());
+  for (std::size_t i = 0; i < n; ++i)
+    if (inners.of[i] != 0 && static_cast<double>(to_outside[i]) > 6) depth[inners.of[i]] += 1;
+  const std::size_t main = static_cast<std::size_t>(std::max_element(depth.begin(), depth.end()) - depth.begin());
+  for (std::size_t i = 0; i < n; ++i) inner[i] = main > 0 && inners.of[i] == main ? 1 : 0;
+  const std::vector<float> to_inner = distance_mm(f, inner, context);
+  c.mask.assign(n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    c.mask[i] = pieces.of[i] == best && to_before[i] <= to_behind[i] && static_cast<double>(to_inner[i]) < kMouthMm ? 1 : 0;
+  }
+  keep_tube(f, c.mask, to_outside);
+  // Against bone the edge lies half way from air to bone, which is higher than half way to skin.
+  {
+    const std::vector<float> to_mask = distance_mm(f, c.mask, context);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (c.mask[i] != 0 || c.exterior[i] != 0 || to_behind[i] < to_before[i]) continue;
+      c.mask[i] = static_cast<double>(to_mask[i]) < 1.1 * f.h_mm && static_cast<double>(to_bone[i]) < 1.6 * f.h_mm &&
+                          static_cast<double>(f.v[i]) < levels.cell_below
+                      ? 1
+                      : 0;
+    }
+  }
+  // Its inner end: the voxels deepest from the outside.
+  double deepest = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    if (c.mask[i] != 0) deepest = std::max(deepest, static_cast<double>(to_outside[i]));
+  if (deepest <= 0) {
+    c.why = "no air goes from outside into bone on this side";
+    return c;
+  }
+  Vec3 sum;
+  double count = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (c.mask[i] == 0 || static_cast<double>(to_outside[i]) < deepest - 1) continue;
+    const auto p = f.place(i);
+    sum += f.world(p[0], p[1], p[2]);
+    count += 1;
+  }
+  c.drum_mm = sum / count;
+  c.length_mm = deepest;
+  // Quality: the share of the deeper half's wall that has bone behind it.
+  double wall = 0, backed = 0, volume = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (c.mask[i] == 0) continue;
+    volume += voxel;
+    if (static_cast<double>(to_outside[i]) < 0.5 * deepest || static_cast<double>(to_outside[i]) > deepest - 2.5) continue;
+    if (static_cast<double>(to_solid[i]) > 1.5 * f.h_mm) continue;
+    wall += 1;
+    backed += static_cast<double>(to_bone[i]) < 1.5 + f.h_mm ? 1 : 0;
+  }
+  c.quality = wall > 0 ? backed / wall : 0;
+  if (c.length_mm < 8 || volume < 150) {
+    c.why = "the air that goes inward is too short for a canal";
+  } else if (c.length_mm > 50 || volume > 6000) {
+    c.why = "the air that goes inward is no canal: no drum ends it";
+  } else if (c.quality < kLeastBony) {
+    // A fold, the mouth or the nose: what would be placed by it would be wrong.
+    c.why = "the air that goes inward has bone behind only " + std::to_string(static_cast<int>(std::lround(100 * c.quality))) +
+            " % of its wall";
+  } else {
+    c.found = true;
+    if (!drum) c.why = "no air behind its end: the middle ear is not seen apart from it";
+  }
+  return c;
+}
+
+Part find_air_cells(const Field& f, const Levels& levels, const Canal& canal, const Context& context) {
+  Part part;
+  const std::size_t n = f.size();
+  // Surely air, in the ear's box, neither outside nor canal.
+  const Vec3 lo = canal.drum_mm + Vec3{-11, -13, -36}, hi = canal.drum_mm + Vec3{40, 45, 22};
+  const auto in_box = [&](std::size_t i) {
+    const auto p = f.place(i);
+    const Vec3 x = f.world(p[0], p[1], p[2]);
+    return x.x > lo.x && x.y > lo.y && x.z > lo.z && x.x < hi.x && x.y < hi.y && x.z < hi.z;
+  };
+  Mask sure(n), bone(n), taken(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    bone[i] = static_cast<double>(f.v[i]) > levels.bone_above ? 1 : 0;
+    taken[i] = canal.mask[i] != 0 || canal.exterior[i] != 0 ? 1 : 0;
+  }
+  const std::vector<float> to_bone = distance_mm(f, bone, context), to_taken = distance_mm(f, taken, context);
+  for (std::size_t i = 0; i < n; ++i) {
+    sure[i] = static_cast<double>(f.v[i]) < levels.air_below && taken[i] == 0 && static_cast<double>(to_bone[i]) < 6 && in_box(i) ? 1 : 0;
+  }
+  // Pieces that bone surrounds: not the folds of the auricle.
+  const Pieces pieces = pieces_of(f, sure, true);
+  std::vector<double> near(pieces.size.size()), open(pieces.size.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (pieces.of[i] == 0) continue;
+    near[pieces.of[i]] += static_cast<double>(to_bone[i]) < 3 ? 1 : 0;
+    const auto p = f.place(i);
+    for (const int d : {-1, 1}) {
+      if (!f.inside(p[0] + d, p[1], p[2])) continue;
+      open[pieces.of[i]] += canal.exterior[f.at(p[0] + d, p[1], p[2])];
+    }
+  }
+  const double voxel = f.h_mm * f.h_mm * f.h_mm;
+  Mask kept(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t p = pieces.of[i];
+    if (p == 0) continue;
+    kept[i] = near[p] > 0.7 * static_cast<double>(pieces.size[p]) && static_cast<double>(pieces.size[p]) * voxel > 0.6 &&
+                      open[p] < 0.1 * static_cast<double>(pieces.size[p])
+                  ? 1
+                  : 0;
+  }
+  // Their edges towards bone lie half way from air to bone, within a voxel of what is surely air.
+  const std::vector<float> to_kept = distance_mm(f, kept, context);
+  double volume = 0, more = 0, less = 0;
+  part.mask.assign(n, 0);
+  constexpr double kShiftHu = 150;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (taken[i] != 0 || static_cast<double>(to_taken[i]) < 1.1 * f.h_mm || static_cast<double>(to_kept[i]) > 1.1 * f.h_mm || !in_box(i)) {
+      part.mask[i] = kept[i];
+      volume += kept[i] * voxel;
+      more += kept[i] * voxel;
+      less += kept[i] * voxel;
+      continue;
+    }
+    const auto v = static_cast<double>(f.v[i]);
+    const double level = levels.cell_below;
+    part.mask[i] = v < level ? 1 : 0;
+    volume += v < level ? voxel : 0;
+    more += v < level + kShiftHu ? voxel : 0;
+    less += v < level - kShiftHu ? voxel : 0;
+  }
+  if (volume < 200) {
+    part.why = "less than 0.2 mL of air behind the ear canal: a mastoid without cells, or filled";
+    return part;
+  }
+  part.quality = std::clamp(1 - (more - less) / (2 * volume), 0.0, 1.0);
+  part.found = true;
+  return part;
+}
+
+Part find_labyrinth(const Field& f, const Levels& levels, Vec3 point_mm, const Context& context) {
+  Part part;
+  const std::size_t n = f.size();
+  constexpr double kReachMm = 13;
+  Mask air(n);
+  for (std::size_t i = 0; i < n; ++i) air[i] = static_cast<double>(f.v[i]) < levels.air_below ? 1 : 0;
+  const std::vector<float> to_air = distance_mm(f, air, context);
+  // The seed: the darkest voxel within a mm of the point.
+  const auto c = f.nearest(point_mm);
+  std::size_t seed = f.at(c[0], c[1], c[2]);
+  const int reach = std::max(1, static_cast<int>(1.0 / f.h_mm));
+  for (int k = -reach; k <= reach; ++k)
+    for (int j = -reach; j <= reach; ++j)
+      for (int i = -reach; i <= reach; ++i) {
+        if (!f.inside(c[0] + i, c[1] + j, c[2] + k)) continue;
+        const std::size_t at = f.at(c[0] + i, c[1] + j, c[2] + k);
+        if (static_cast<double>(to_air[at]) > 1.6 * f.h_mm && f.v[at] < f.v[seed]) seed = at;
+      }
+  if (static_cast<double>(f.v[seed]) > levels.bone_above) {
+    part.why = "the point lies in bone";
+    return part;
+  }
+  if (static_cast<double>(f.v[seed]) < levels.air_below || static_cast<double>(to_air[seed]) <= 1.6 * f.h_mm) {
+    part.why = "the point lies in air or beside it";
+    return part;
+  }
+  const auto flood = [&](double level, const std::vector<std::uint8_t>* barred) {
+    return climbed(f, f.v, {seed}, [&](std::size_t i) {
+      if (static_cast<double>(f.v[i]) > level || static_cast<double>(to_air[i]) <= 1.6 * f.h_mm || (barred != nullptr && (*barred)[i] != 0))
+        return false;
+      const auto p = f.place(i);
+      return length(f.world(p[0], p[1], p[2]) - point_mm) < kReachMm;
+    });
+  };
+  // What lies behind a pass and is wide or large, is no part of it: the internal auditory canal, the fallopian canal, the brain.
+  std::vector<std::uint8_t> barred(n, 0);
+  std::vector<float> up;
+  const double voxel = f.h_mm * f.h_mm * f.h_mm;
+  for (int round = 0; round < 6; ++round) {
+    up = flood(levels.bone_above, &barred);
+    const Pass pass = greatest_pass(f, f.v, up, std::max(60.0, 2 * levels.noise_hu));
+    // One of its canals has 20 mm3, the cochlea 60.
+    const bool touches = pass.volume_mm3 > 90;
+    if (!touches) break;
+    for (std::size_t i = 0; i < n; ++i)
+      if (static_cast<double>(up[i]) == pass.height) barred[i] = 1;
+  }
+  part.mask.assign(n, 0);
+  double volume = 0, less = 0, rim = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (up[i] == std::numeric_limits<float>::infinity()) continue;
+    part.mask[i] = 1;
+    volume += voxel;
+    less += static_cast<double>(up[i]) < levels.bone_above - 150 ? voxel : 0;
+    const auto p = f.place(i);
+    rim += length(f.world(p[0], p[1], p[2]) - point_mm) > kReachMm - 1 ? voxel : 0;
+  }
+  if (volume < 40) {
+    part.why = "less than 40 mm3 of fluid around the point: not the labyrinth";
+    return part;
+  }
+  if (volume > 600 || rim > 5) {
+    part.why = "the fluid around the point runs out of the bone: not the labyrinth, or its walls are not seen";
+    return part;
+  }
+  part.quality = std::clamp(less / volume, 0.0, 1.0);
+  part.found = true;
+  return part;
+}
+
+}  // namespace osteo::imaging::segment

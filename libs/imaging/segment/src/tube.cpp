@@ -1,0 +1,348 @@
+#include "osteo/imaging/segment/tube.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "field.h"
+#include "line.h"
+#include "osteo/core/base/error.h"
+#include "osteo/core/base/parallel.h"
+#include "tube_path.h"
+
+namespace osteo::inline imaging {
+namespace {
+
+using segment::evenly;
+using segment::Sampler;
+using segment::smoothed_line;
+
+constexpr double kStepMm = 0.25;  // between stations
+constexpr int kRays = 24;         // across
+constexpr double kRayStepMm = 0.1;
+constexpr double kSmoothMm = 0.4;  // along, standard deviation
+constexpr int kRounds = 5;
+constexpr double kLeastWallHu = 150;  // a wall stands out by this much, and by four times the noise
+
+std::vector<std::size_t> nearest_stations(const std::vector<Vec3>& line, std::span<const Vec3> points) {
+  // In order along the line: a line that comes near itself must not take a later point for an earlier one.
+  std::vector<std::size_t> at;
+  std::size_t from = 0;
+  for (std::size_t q = 0; q < points.size(); ++q) {
+    std::size_t best = from;
+    for (std::size_t i = from; i < line.size(); ++i)
+      if (length(line[i] - points[q]) < length(line[best] - points[q])) best = i;
+    if (q == 0) best = 0;
+    if (q + 1 == points.size()) best = line.size() - 1;
+    at.push_back(best);
+    from = best;
+  }
+  return at;
+}
+
+struct Cross {
+  Vec3 centre;
+  double radius = 0, confidence = 0;
+};
+
+/// What the CT shows across the line at a point.
+Cross look_across(const Sampler& hu, Vec3 at, Vec3 along, double noise, const TubeParams& params) {
+  const Vec3 u = any_perpendicular(along), v = cross(along, u);
+  const double reach = 1.5 * params.max_radius_mm + 0.8;
+  const int n = static_cast<int>(reach / kRayStepMm) + 1;
+  const auto value = [&](Vec3 p) { return (hu(p - along * 0.3) + 2 * hu(p) + hu(p + along * 0.3)) / 4; };
+  double middle = value(at);
+  for (int q = 0; q < 6; ++q) {
+    const double a = q * std::numbers::pi / 3;
+    middle += value(at + (u * std::cos(a) + v * std::sin(a)) * 0.15);
+  }
+  middle /= 7;
+  // Dark in bone or bright in air: what most of the surroundings are.
+  std::array<std::vector<double>, kRays> ray;
+  std::vector<double> around;
+  for (int q = 0; q < kRays; ++q) {
+    const double a = 2 * std::numbers::pi * q / kRays;
+    const Vec3 d = u * std::cos(a) + v * std::sin(a);
+    auto& r = ray[static_cast<std::size_t>(q)];
+    r.resize(static_cast<std::size_t>(n));
+    for (int i = 0; i < n; ++i) r[static_cast<std::size_t>(i)] = i == 0 ? middle : value(at + d * (i * kRayStepMm));
+    around.push_back(r[static_cast<std::size_t>(std::min(n - 1, static_cast<int>(std::lround(1.0 / kRayStepMm))))]);
+  }
+  std::nth_element(around.begin(), around.begin() + kRays / 2, around.end());
+  const bool nerve = params.kind == TubeKind::nerve;
+  const bool in_air = nerve && around[kRays / 2] < -500 && middle < 0;
+  const double sign = nerve && !in_air ? 1 : -1;             // which way the wall differs from the content
+  if (nerve && !in_air && middle < -350) return {at, 0, 0};  // an air cell
+  // The wall of each ray: where the value is farthest from the middle's before it comes back by half.
+  const double least = std::max(kLeastWallHu, 4 * noise);
+  struct Edge {
+    double distance, wall, level;
+    bool met;
+  };
+  std::array<Edge, kRays> edges{};
+  std::vector<double> walls;
+  int met = 0;
+  for (std::size_t q = 0; q < kRays; ++q) {
+    const auto& r = ray[q];
+    int top = 0, low = 0;  // the wall; where the content is purest before it
+    for (int i = 1; i < n; ++i) {
+      const double x = sign * r[static_cast<std::size_t>(i)];
+      const double peak = sign * r[static_cast<std::size_t>(top)], base = sign * r[static_cast<std::size_t>(low)];
+      if (x > peak) top = i;
+      if (peak - base < least) {
+        if (x < base) low = top = i;
+        if (low * kRayStepMm > 0.6 * params.max_radius_mm + 0.3) break;  // it only gets purer: not here
+      } else if (peak - x > std::max(2 * noise, 0.15 * (peak - base))) {
+        break;
+      }
+    }
+    const double base = sign * r[static_cast<std::size_t>(low)], peak = sign * r[static_cast<std::size_t>(top)];
+    if (peak - base < least) continue;
+    const double half = 0.5 * (base + peak);
+    int i = low;
+    while (i < top && sign * r[static_cast<std::size_t>(i + 1)] < half) ++i;
+    const double a = sign * r[static_cast<std::size_t>(i)], b = sign * r[static_cast<std::size_t>(std::min(i + 1, n - 1))];
+    const double at_mm = (i + (b > a ? std::clamp((half - a) / (b - a), 0.0, 1.0) : 0.5)) * kRayStepMm;
+    if (at_mm > 1.2 * params.max_radius_mm) continue;
+    edges[q] = {at_mm, top * kRayStepMm, peak, true};
+    walls.push_back(peak);
+    ++met;
+  }
+  if (met < kRays / 4) return {at, 0, static_cast<double>(met) / kRays};
+  // Circle through the edges by least squares, far ones left out. I. Kasa 1976.
+  std::vector<double> distances;
+  for (const Edge& e : edges)
+    if (e.met) distances.push_back(e.distance);
+  std::nth_element(distances.begin(), distances.begin() + met / 2, distances.end());
+  const double usual = distances[static_cast<std::size_t>(met / 2)];
+  double sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sz = 0, sxz = 0, syz = 0, count = 0;
+  for (std::size_t q = 0; q < kRays; ++q) {
+    if (!edges[q].met || edges[q].distance > 1.8 * usual + 0.1) {
+      if (edges[q].met) --met;
+      edges[q].met = false;
+      continue;
+    }
+    const double a = 2 * std::numbers::pi * static_cast<double>(q) / kRays;
+    const double x = edges[q].distance * std::cos(a), y = edges[q].distance * std::sin(a), z = x * x + y * y;
+    sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y, sz += z, sxz += x * z, syz += y * z, count += 1;
+  }
+  Cross c{at, 0, static_cast<double>(met) / kRays};
+  const double cxx = sxx - sx * sx / count, cyy = syy - sy * sy / count, cxy = sxy - sx * sy / count;
+  const double bx = 0.5 * (sxz - sx * sz / count), by = 0.5 * (syz - sy * sz / count), det = cxx * cyy - cxy * cxy;
+  double mx = 0, my = 0;
+  if (det > 1e-6 * count * count) {
+    mx = (bx * cyy - by * cxy) / det;
+    my = (by * cxx - bx * cxy) / det;
+  }
+  const double off = std::sqrt(mx * mx + my * my), most = 0.35;
+  if (off > most) mx *= most / off, my *= most / off;
+  c.centre = at + u * mx + v * my;
+  // Radius from what is missing: the blur moves it about but takes nothing away. Only where the wall is whole.
+  std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(walls.size() / 2), walls.end());
+  const double wall = walls[walls.size() / 2];
+  // A vessel's content is what its middle shows, which is too little when it is thin.
+  const double content = nerve ? sign * params.content_hu : sign * middle;
+  // From the mean of the rays, whose noise is less: the highest of a noisy ray is above its wall.
+  std::vector<double> mean(static_cast<std::size_t>(n));
+  double used = 0;
+  int reached = 0;
+  for (std::size_t q = 0; q < kRays; ++q) {
+    if (!edges[q].met || edges[q].level < wall - 0.25 * std::abs(wall - content)) continue;
+    used += 1;
+    reached += static_cast<int>(std::lround(edges[q].wall / kRayStepMm));
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += sign * ray[q][i];
+  }
+  if (used == 0) return {c.centre, usual, c.confidence};
+  reached = static_cast<int>(reached / used) + 1;
+  int top = 0;
+  for (int i = 1; i <= std::min(reached, n - 1); ++i)
+    if (mean[static_cast<std::size_t>(i)] > mean[static_cast<std::size_t>(top)]) top = i;
+  const double level = mean[static_cast<std::size_t>(top)] / used;
+  double area = 0;
+  for (int i = 0; i < top; ++i) {
+    const double missing = level - mean[static_cast<std::size_t>(i)] / used;
+    const double r0 = std::max(0.0, (i - 0.5) * kRayStepMm), r1 = (i + 0.5) * kRayStepMm;
+    area += missing / std::max(1.0, level - content) * (r1 * r1 - r0 * r0);
+  }
+  c.radius = std::sqrt(std::max(0.0, area));
+  return c;
+}
+
+}  // namespace
+
+Tube trace_tube(const Image& ct, std::span<const Vec3> points_mm, const TubeParams& params, const Context& context) {
+  if (points_mm.size() < 2) throw Error(ExitCode::usage, "a tube needs two points or more", "where it begins and where it ends");
+  const Vec3 last{ct.frame.dims[0] - 0.5, ct.frame.dims[1] - 0.5, ct.frame.dims[2] - 0.5};
+  Vec3 lo{1e30, 1e30, 1e30}, hi{-1e30, -1e30, -1e30};
+  double longest = 0;
+  for (std::size_t i = 0; i < points_mm.size(); ++i) {
+    const Vec3 p = points_mm[i], x = ct.frame.index_from_world(p);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!(x[a] >= -0.5 && x[a] <= last[a])) {
+        throw Error(ExitCode::usage, "point " + std::to_string(i + 1) + " lies outside the CT",
+                    "'osteo info' shows where the CT lies (LPS mm)");
+      }
+      lo[a] = std::min(lo[a], p[a]);
+      hi[a] = std::max(hi[a], p[a]);
+    }
+    if (i > 0) longest = std::max(longest, length(p - points_mm[i - 1]));
+  }
+  if (length(hi - lo) < 0.5) throw Error(ExitCode::usage, "the points of the tube are all the same");
+  const double margin = std::clamp(0.35 * longest, 5.0, 15.0);
+  const Vec3 s = ct.frame.spacing_mm, rim{margin, margin, margin};
+  const double h = std::clamp(0.8 * std::min({s.x, s.y, s.z}), 0.3, 0.6);
+  const segment::Field field = segment::make_field(ct, lo - rim, hi + rim, h, context.threads);
+  const std::vector<float> like = segment::tubeness(field, params, context.sub(0, 0.5));
+  const std::vector<Vec3> way =
+      segment::cheapest_way(field, like, points_mm, std::min(params.snap_mm, params.max_radius_mm), context.sub(0.5, 0.9));
+
+  const double noise = segment::noise_of(ct);
+  const Sampler hu(ct);
+  // Given points hold the line where the CT shows nothing; where it does, the CT is right.
+  std::vector<Vec3> line = evenly(way, kStepMm);
+  std::vector<double> weight(line.size(), 1.0);
+  line = evenly(smoothed_line(line, weight, kStepMm, kSmoothMm), kStepMm);
+  std::vector<Cross> crosses;
+  for (int round = 0; round <= kRounds; ++round) {
+    context.progress(0.9 + 0.1 * round / (kRounds + 1), "walls");
+    crosses.assign(line.size(), {});
+    parallel_for(line.size(), 16, context.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t a = i > 2 ? i - 2 : 0, b = std::min(i + 2, line.size() - 1);
+        crosses[i] = look_across(hu, line[i], normalized(line[b] - line[a]), noise, params);
+      }
+    });
+    if (round == kRounds) break;
+    std::vector<Vec3> moved(line);
+    weight.assign(line.size(), 0.0);
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      if (crosses[i].confidence < 0.5) continue;
+      moved[i] = crosses[i].centre;
+      weight[i] = crosses[i].confidence;
+    }
+    const auto given = nearest_stations(line, points_mm);
+    for (std::size_t q = 0; q < given.size(); ++q) {
+      if (weight[given[q]] > 0) continue;
+      moved[given[q]] = points_mm[q];
+      weight[given[q]] = 1;
+    }
+    line = evenly(smoothed_line(moved, weight, kStepMm, kSmoothMm), kStepMm);
+  }
+
+  Tube tube;
+  const std::size_t n = line.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    // Of radius and confidence the median of five neighbours: single sections mislead.
+    std::vector<double> r, c;
+    for (std::size_t q = i > 2 ? i - 2 : 0; q <= std::min(i + 2, n - 1); ++q) {
+      if (crosses[q].radius > 0) r.push_back(crosses[q].radius);
+      c.push_back(crosses[q].confidence);
+    }
+    std::sort(r.begin(), r.end());
+    std::sort(c.begin(), c.end());
+    const double arc = i == 0 ? 0 : tube.stations.back().arc_mm + length(line[i] - line[i - 1]);
+    tube.stations.push_back({line[i], arc, r.empty() ? 0 : r[r.size() / 2], c[c.size() / 2]});
+  }
+  // Without walls the radius is that of the nearest place that has some.
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t away = 1; tube.stations[i].radius_mm <= 0 && away < n; ++away) {
+      if (i >= away && crosses[i - away].radius > 0) tube.stations[i].radius_mm = crosses[i - away].radius;
+      if (i + away < n && crosses[i + away].radius > 0) tube.stations[i].radius_mm = crosses[i + away].radius;
+    }
+  }
+  tube.length_mm = tube.stations.back().arc_mm;
+  std::vector<bool> given(n);
+  for (const std::size_t i : nearest_stations(line, points_mm)) given[i] = true;
+  double sure = 0;
+  tube.radius_min_mm = 1e9;
+  double worst = 0, since = 0;  // without walls and without a given point
+  for (std::size_t i = 0; i < n; ++i) {
+    const TubeStation& t = tube.stations[i];
+    tube.confidence += t.confidence / static_cast<double>(n);
+    if (t.confidence >= 0.5) {
+      sure += 1;
+      tube.radius_mean_mm += t.radius_mm;
+      tube.radius_min_mm = std::min(tube.radius_min_mm, t.radius_mm);
+      tube.radius_max_mm = std::max(tube.radius_max_mm, t.radius_mm);
+      continue;
+    }
+    const bool goes_on = i > 0 && tube.stations[i - 1].confidence < 0.5;
+    if (!goes_on) tube.unsure_mm.push_back({t.arc_mm, t.arc_mm});
+    if (!goes_on || given[i]) since = t.arc_mm;
+    tube.unsure_mm.back()[1] = t.arc_mm;
+    worst = std::max(worst, t.arc_mm - since);
+  }
+  if (worst > params.max_unsure_mm || sure < 0.25 * static_cast<double>(n)) {
+    const auto bad = std::max_element(tube.unsure_mm.begin(), tube.unsure_mm.end(),
+                                      [](const auto& a, const auto& b) { return a[1] - a[0] < b[1] - b[0]; });
+    const auto mm = [](double x) { return format_number(std::round(x * 10) / 10); };
+    throw Error(ExitCode::failed,
+                "the points are not joined by a tube: no walls from " + mm((*bad)[0]) + " to " + mm((*bad)[1]) + " mm of " +
+                    mm(tube.length_mm) + " mm along the way",
+                "give a point on it there, check --kind, or allow it with --max-unsure-mm");
+  }
+  tube.radius_mean_mm /= sure;
+  context.progress(1.0);
+  return tube;
+}
+
+Labels draw_tube(const Tube& tube, const Frame& frame, const std::string& name, const Labels* onto) {
+  if (onto != nullptr && !(onto->frame.dims == frame.dims && same_place(onto->frame, frame))) {
+    throw Error(ExitCode::usage, "the label map does not lie on the voxels of the CT", "make it from this CT");
+  }
+  Labels out;
+  out.frame = frame;
+  if (onto != nullptr) out.structures = onto->structures;
+  const auto voxels = make_voxels<std::uint8_t>(frame.voxel_count());
+  for (std::size_t i = 0; i < frame.voxel_count(); ++i) voxels[i] = onto != nullptr ? onto->voxels[i] : 0;
+  std::uint8_t value = 0;
+  for (const Structure& s : out.structures)
+    if (s.name == name) value = s.value;
+  if (value != 0) {
+    for (std::size_t i = 0; i < frame.voxel_count(); ++i)
+      if (voxels[i] == value) voxels[i] = 0;
+  } else {
+    std::array<bool, 256> taken{};
+    for (std::size_t i = 0; i < frame.voxel_count(); ++i) taken[voxels[i]] = true;
+    for (const Structure& s : out.structures) taken[s.value] = true;
+    int free = 1;
+    while (free < 256 && taken[static_cast<std::size_t>(free)]) ++free;
+    if (free == 256) throw Error(ExitCode::usage, "the label map holds 255 structures already");
+    value = static_cast<std::uint8_t>(free);
+    out.structures.push_back({value, name, {}});
+    std::sort(out.structures.begin(), out.structures.end(), [](const Structure& a, const Structure& b) { return a.value < b.value; });
+  }
+  const auto at = [&](int i, int j, int k) {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(frame.dims[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(frame.dims[0]) +
+           static_cast<std::size_t>(i);
+  };
+  for (std::size_t s = 0; s + 1 < tube.stations.size(); ++s) {
+    const TubeStation &a = tube.stations[s], &b = tube.stations[s + 1];
+    const Vec3 ab = b.at_mm - a.at_mm;
+    const double l2 = std::max(dot(ab, ab), 1e-12), r = std::max(a.radius_mm, b.radius_mm);
+    std::array<int, 3> lo{}, hi{};
+    const Vec3 ia = frame.index_from_world(a.at_mm), ib = frame.index_from_world(b.at_mm);
+    for (std::size_t x = 0; x < 3; ++x) {
+      const double reach = r / frame.spacing_mm[x];
+      lo[x] = std::max(0, static_cast<int>(std::floor(std::min(ia[x], ib[x]) - reach)));
+      hi[x] = std::min(frame.dims[x] - 1, static_cast<int>(std::ceil(std::max(ia[x], ib[x]) + reach)));
+    }
+    for (int k = lo[2]; k <= hi[2]; ++k)
+      for (int j = lo[1]; j <= hi[1]; ++j)
+        for (int i = lo[0]; i <= hi[0]; ++i) {
+          const Vec3 p = frame.world_from_index({static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
+          const double t = std::clamp(dot(p - a.at_mm, ab) / l2, 0.0, 1.0);
+          if (length(p - (a.at_mm + ab * t)) <= a.radius_mm + (b.radius_mm - a.radius_mm) * t) voxels[at(i, j, k)] = value;
+        }
+    for (int q = 0; q <= 4; ++q) {
+      const Vec3 x = ia + (ib - ia) * (q / 4.0);
+      const int i = static_cast<int>(std::lround(x.x)), j = static_cast<int>(std::lround(x.y)), k = static_cast<int>(std::lround(x.z));
+      if (i >= 0 && j >= 0 && k >= 0 && i < frame.dims[0] && j < frame.dims[1] && k < frame.dims[2]) voxels[at(i, j, k)] = value;
+    }
+  }
+  out.voxels = voxels;
+  return out;
+}
+
+}  // namespace osteo::imaging

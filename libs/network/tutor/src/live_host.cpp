@@ -1,0 +1,306 @@
+#include <algorithm>
+#include <cstring>
+
+#include "handshake.h"
+#include "osteo/network/tutor/live.h"
+
+namespace osteo::inline network {
+namespace {
+
+constexpr std::int64_t kSendEveryUs = 4000, kGoneUs = 10'000'000;
+constexpr std::uint64_t kWindowTicks = 4096;  // on their way to one who catches up
+constexpr std::uint64_t kOverlap = 8;         // of the newest ticks, sent again with each packet
+constexpr int kPacketsAPoll = 16;
+constexpr std::size_t kWindowBytes = 256 << 10;  // of settings, on their way
+
+std::uint64_t random_number() {
+  const Pairing::Nonce nonce = Pairing::make_nonce();
+  std::uint64_t n = 0;
+  std::memcpy(&n, nonce.data(), sizeof n);
+  return n | 1;  // 0: none
+}
+
+}  // namespace
+
+LiveHost::LiveHost(std::string_view tidy_code, Bytes settings, std::size_t hands, std::shared_ptr<FarDevice> far)
+    : code_(tidy_code), settings_(std::move(settings)), hands_(hands), far_(std::move(far)), session_(random_number()) {}
+
+void LiveHost::action(const SceneAction& action) {
+  const std::lock_guard lock(mutex_);
+  actions_.push_back(action);
+}
+
+void LiveHost::tick(const TickRecord& record, std::span<const VoxelChange> changes) {
+  const std::lock_guard lock(mutex_);
+  if (state_ == LogState::lost) return;
+  if (record.tick * hands_ + record.hand != log_.size()) {
+    // Ticks were dropped before they came here; or there is no more room for a lesson of half an hour.
+    state_ = LogState::lost;
+    return;
+  }
+  if (log_.size() >= kMostTicks * hands_) {
+    state_ = LogState::lost;
+    return;
+  }
+  log_.push_back(record.device);
+  hash_ = mixed(hash_, record.tick, changes);
+  if (record.hand + 1 == hands_ && (record.tick + 1) % kMarkTicks == 0) {
+    marks_[record.tick + 1] = hash_;
+    if (marks_.size() > 64) marks_.erase(marks_.begin());
+  }
+}
+
+BoneMark LiveHost::mark() const {
+  const std::lock_guard lock(mutex_);
+  return {log_.size() / hands_, hash_};
+}
+
+void LiveHost::over(std::uint64_t ticks) {
+  const std::lock_guard lock(mutex_);
+  if (state_ == LogState::runs) state_ = log_.size() == ticks * hands_ ? LogState::over : LogState::lost;
+}
+
+bool LiveHost::lost() const {
+  const std::lock_guard lock(mutex_);
+  return state_ == LogState::lost;
+}
+
+bool LiveHost::waited_for(std::int64_t now_us) const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(peers_.begin(), peers_.end(),
+                     [&](const auto& p) { return p->next_tick < log_.size() / hands_ && now_us - p->last_heard_us <= kGoneUs; });
+}
+
+int LiveHost::tries_left() const {
+  const std::lock_guard lock(mutex_);
+  return tries_;
+}
+
+std::uint64_t LiveHost::refused() const {
+  const std::lock_guard lock(mutex_);
+  return refused_;
+}
+
+std::vector<PeerStatus> LiveHost::status(std::int64_t now_us) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<PeerStatus> all;
+  for (const auto& p : peers_) {
+    const std::uint64_t ticks = log_.size() / hands_;
+    all.push_back({p->role, p->clock.rtt_ms(), p->clock.offset_ms(), p->clock.drift_ppm(), p->channel->lost(),
+                   now_us - p->last_heard_us < 1'000'000, p->ready, ticks - std::min(ticks, p->next_tick), p->differs, p->same});
+  }
+  return all;
+}
+
+void LiveHost::refuse(const UdpPeer& to, const Pairing::Nonce& nonce, std::uint8_t why) {
+  out_.push_back({to, PairingPacket(PairingStep::refused).add(nonce).add(why).bytes});
+}
+
+void LiveHost::pair(const UdpPeer& from, std::span<const std::uint8_t> packet, std::int64_t now_us) {
+  PairingFields f(packet);
+  const auto nonce = f.take<Pairing::Nonce>();
+  if (!f.good || (f.step != PairingStep::ask && f.step != PairingStep::prove)) {
+    ++refused_;
+    return;
+  }
+  if (f.protocol != kTutorProtocol) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::protocol));
+  pairings_ = std::min<double>(kPairingsPerS, pairings_ + static_cast<double>(now_us - pairings_us_) * 1e-6 * kPairingsPerS);
+  pairings_us_ = now_us;
+  if (pairings_ < 1) {  // a flood: the costly part is not done more often than this
+    ++refused_;
+    return;
+  }
+  pairings_ -= 1;
+  if (tries_ <= 0) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::locked));
+  const auto known = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) { return p.from == from && p.guest == nonce; });
+  if (f.step == PairingStep::ask) {
+    const auto role = static_cast<JoinRole>(f.take<std::uint8_t>());
+    if (!f.good || packet.size() < kAskBytes || (role != JoinRole::trainee && role != JoinRole::watcher)) {
+      ++refused_;
+      return;
+    }
+    if (known == pending_.end()) {
+      if (pending_.size() >= kMostPending) pending_.pop_front();
+      Pending p{from, role, nonce, Pairing::make_nonce(), nullptr};
+      p.pairing = std::make_unique<Pairing>(code_, p.guest, p.host);
+      pending_.push_back(std::move(p));
+    }
+    const Pending& p = known == pending_.end() ? pending_.back() : *known;
+    out_.push_back({from, PairingPacket(PairingStep::challenge).add(nonce).add(p.host).add(p.pairing->share()).bytes});
+    return;
+  }
+  const auto share = f.take<Pairing::Share>();
+  const auto tag = f.take<std::array<std::uint8_t, 16>>();
+  if (!f.good) {
+    ++refused_;
+    return;
+  }
+  if (known == pending_.end()) {
+    // The welcome was lost.
+    for (const auto& p : peers_) {
+      if (p->from == from && p->nonce == nonce)
+        out_.push_back({from, PairingPacket(PairingStep::welcome).add(nonce).add(p->channel->connection()).add(p->welcome).bytes});
+    }
+    return;
+  }
+  const Pending pending = std::move(*known);
+  pending_.erase(known);
+  const auto keys = pending.pairing->keys(share, true);
+  if (!keys || !same_proof(proof(*keys, "guest"), tag)) {
+    --tries_;
+    ++refused_;
+    return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::wrong_code));
+  }
+  tries_ = kTries;
+  // Who comes back takes his own place; so does a trainee whose link has dropped.
+  std::erase_if(peers_, [&](const auto& p) {
+    return p->from == from || now_us - p->last_heard_us > kGoneUs ||
+           (p->role == JoinRole::trainee && pending.role == JoinRole::trainee && now_us - p->last_heard_us > 1'000'000);
+  });
+  const bool taken = pending.role == JoinRole::trainee &&
+                     std::any_of(peers_.begin(), peers_.end(), [](const auto& p) { return p->role == JoinRole::trainee; });
+  if (taken || peers_.size() >= kMostPeers) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::full));
+  auto peer = std::make_unique<Peer>();
+  peer->from = from;
+  peer->role = pending.role;
+  peer->nonce = nonce;
+  peer->welcome = proof(*keys, "host");
+  peer->channel = std::make_unique<SecureChannel>(next_connection_++, keys->to_guest, keys->to_host);
+  peer->last_heard_us = now_us;
+  out_.push_back({from, PairingPacket(PairingStep::welcome).add(nonce).add(peer->channel->connection()).add(peer->welcome).bytes});
+  peers_.push_back(std::move(peer));
+}
+
+void LiveHost::receive(const UdpPeer& from, std::span<const std::uint8_t> packet, std::int64_t now_us) {
+  const std::lock_guard lock(mutex_);
+  if (packet.size() >= 4 && std::all_of(packet.begin(), packet.begin() + 4, [](std::uint8_t b) { return b == 0; }))
+    return pair(from, packet, now_us);
+  for (const auto& p : peers_) {
+    if (p->from != from) continue;
+    const auto plain = p->channel->open(packet);
+    if (!plain) break;
+    const auto said = decode_hand(*plain);
+    if (!said) break;
+    return hear(*p, *said, now_us);
+  }
+  ++refused_;
+}
+
+void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
+  peer.last_heard_us = now_us;
+  peer.clock.heard(p.times, now_us);
+  const std::uint64_t ticks = log_.size() / hands_;
+  if (p.next_tick <= ticks) {
+    if (p.next_tick < peer.next_tick) peer.sent_to = p.next_tick;  // it begins again
+    if (p.next_tick != peer.next_tick) peer.last_moved_us = now_us;
+    peer.next_tick = p.next_tick;
+  }
+  peer.ready = p.ready;
+  const auto has = std::min<std::uint32_t>(p.blob_bytes, static_cast<std::uint32_t>(settings_.size()));
+  if (has != peer.blob_bytes) peer.blob_moved_us = now_us;
+  if (has < peer.blob_bytes) peer.blob_sent = has;  // it begins again
+  peer.blob_bytes = has;
+  if (const auto mine = marks_.find(p.mark.tick); mine != marks_.end()) {
+    if (mine->second != p.mark.hash) {
+      if (peer.differs == 0) peer.differs = p.mark.tick;
+    } else {
+      peer.differs = 0;
+      if (p.mark.tick > peer.compared) ++peer.same;
+    }
+    peer.compared = std::max(peer.compared, p.mark.tick);
+  }
+  if (peer.role != JoinRole::trainee || p.samples.empty()) return;
+  const std::uint64_t first = p.newest + 1 - p.samples.size();
+  const bool newest = p.newest > peer.newest_hand;
+  for (std::size_t i = 0; i < p.samples.size(); ++i) {
+    if (first + i <= peer.newest_hand && !(i + 1 == p.samples.size()) && peer.newest_hand - (first + i) > 256) continue;
+    far_->put({first + i, p.samples[i]}, newest && i + 1 == p.samples.size());
+  }
+  peer.newest_hand = std::max(peer.newest_hand, p.newest);
+}
+
+LogPacket LiveHost::log_from(std::uint64_t tick) const {
+  LogPacket p;
+  p.session = session_;
+  p.state = state_;
+  p.first_tick = tick;
+  p.now_tick = log_.size() / hands_;
+  p.hands = static_cast<std::uint8_t>(hands_);
+  std::uint64_t end = std::min<std::uint64_t>(p.now_tick, tick + (hands_ <= 2 ? LogPacket::kMostTicks : LogPacket::kMostTicks / 2));
+  const auto from =
+      std::lower_bound(actions_.begin(), actions_.end(), tick, [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
+  for (auto a = from; a != actions_.end() && a->tick < end; ++a) {
+    if (p.actions.size() == LogPacket::kMostActions) {
+      end = std::max(a->tick, tick + 1);  // more in one tick than fit are none that people do
+      break;
+    }
+    p.actions.push_back(*a);
+  }
+  std::erase_if(p.actions, [&](const SceneAction& a) { return a.tick >= end; });
+  if (state_ == LogState::over && end == p.now_tick) {  // and those behind the last tick
+    const auto behind =
+        std::lower_bound(actions_.begin(), actions_.end(), end, [](const SceneAction& a, std::uint64_t t) { return a.tick < t; });
+    for (auto a = behind; a != actions_.end() && a->tick == end && p.actions.size() < LogPacket::kMostActions; ++a) p.actions.push_back(*a);
+  }
+  p.samples.assign(log_.begin() + static_cast<std::ptrdiff_t>(tick * hands_), log_.begin() + static_cast<std::ptrdiff_t>(end * hands_));
+  if (!marks_.empty()) p.mark = {marks_.rbegin()->first, marks_.rbegin()->second};
+  return p;
+}
+
+std::vector<OutgoingPacket> LiveHost::poll(std::int64_t now_us) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(peers_, [&](const auto& p) { return now_us - p->last_heard_us > kGoneUs; });
+  const std::uint64_t ticks = log_.size() / hands_;
+  for (const auto& peer : peers_) {
+    Peer& p = *peer;
+    if (now_us - p.last_sent_us < kSendEveryUs) continue;
+    p.last_sent_us = now_us;
+    const auto send = [&](auto packet) {
+      packet.times = p.clock.stamp(now_us);
+      out_.push_back({p.from, p.channel->seal(encode(packet))});
+    };
+    const auto patience_us = static_cast<std::int64_t>(p.clock.rtt_ms() * 1000) + 20'000;
+    if (p.blob_bytes < settings_.size()) {
+      // From what it has on, where no more has come for longer than the way takes.
+      if (now_us - p.blob_moved_us > patience_us) {
+        p.blob_sent = p.blob_bytes;
+        p.blob_moved_us = now_us;
+      }
+      std::size_t at = std::max(p.blob_sent, p.blob_bytes);
+      for (int n = 0; at < settings_.size() && at < p.blob_bytes + kWindowBytes && n < kPacketsAPoll; ++n) {
+        BlobPacket b;
+        b.session = session_;
+        b.total = static_cast<std::uint32_t>(settings_.size());
+        b.offset = static_cast<std::uint32_t>(at);
+        const std::size_t end = std::min(settings_.size(), at + BlobPacket::kMost);
+        b.bytes.assign(settings_.begin() + static_cast<std::ptrdiff_t>(at), settings_.begin() + static_cast<std::ptrdiff_t>(end));
+        send(b);
+        at = end;
+      }
+      p.blob_sent = static_cast<std::uint32_t>(at);
+      continue;
+    }
+    // What was lost is sent again when the other side did not come on for longer than the way takes.
+    if (p.next_tick < p.sent_to && now_us - p.last_moved_us > patience_us) {
+      send(log_from(p.next_tick));
+      p.last_moved_us = now_us - patience_us + 10'000;
+    }
+    p.sent_to = std::max(p.sent_to, p.next_tick);
+    int sent = 0;
+    while (p.sent_to + LogPacket::kMostTicks < ticks && p.sent_to < p.next_tick + kWindowTicks && sent < kPacketsAPoll) {
+      const LogPacket log = log_from(p.sent_to);
+      p.sent_to += log.samples.size() / hands_;
+      send(log);
+      ++sent;
+    }
+    if (p.sent_to + LogPacket::kMostTicks >= ticks) {
+      // The newest, with those before them once more.
+      const LogPacket log = log_from(std::min(p.sent_to, ticks > kOverlap ? ticks - kOverlap : 0));
+      p.sent_to = std::max(p.sent_to, log.first_tick + log.samples.size() / hands_);
+      send(log);
+    }
+  }
+  return std::exchange(out_, {});
+}
+
+}  // namespace osteo::network

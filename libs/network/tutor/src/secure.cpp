@@ -1,0 +1,152 @@
+#include "osteo/network/tutor/secure.h"
+
+#include <sodium.h>
+
+#include <cstring>
+
+#include "osteo/core/base/error.h"
+
+namespace osteo::inline network {
+namespace {
+
+constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";  // 32 of them: no 0, 1, I, O
+static_assert(kLetters.size() == 32);
+
+void need_sodium() {
+  static const bool ready = ::sodium_init() >= 0;
+  if (!ready) throw Error(ExitCode::failed, "there is no randomness for a key", "libsodium cannot be used on this machine");
+}
+
+template <std::size_t N>
+void add(crypto_generichash_state& state, const std::array<std::uint8_t, N>& bytes) {
+  ::crypto_generichash_update(&state, bytes.data(), bytes.size());
+}
+void add(crypto_generichash_state& state, std::string_view text) {
+  const auto n = static_cast<std::uint64_t>(text.size());  // so that no two lists of texts run together
+  ::crypto_generichash_update(&state, reinterpret_cast<const unsigned char*>(&n), sizeof n);
+  ::crypto_generichash_update(&state, reinterpret_cast<const unsigned char*>(text.data()), text.size());
+}
+
+}  // namespace
+
+std::string make_pairing_code() {
+  need_sodium();
+  std::string code;
+  for (int i = 0; i < 8; ++i) {
+    if (i == 4) code += '-';
+    code += kLetters[::randombytes_uniform(32)];
+  }
+  return code;
+}
+
+std::string tidy_code(std::string_view typed) {
+  std::string code;
+  for (char c : typed) {
+    if (c == '-' || c == ' ') continue;
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+    if (kLetters.find(c) == std::string_view::npos) return {};
+    code += c;
+  }
+  return code.size() == 8 ? code : std::string();
+}
+
+Pairing::Nonce Pairing::make_nonce() {
+  need_sodium();
+  Nonce nonce;
+  ::randombytes_buf(nonce.data(), nonce.size());
+  return nonce;
+}
+
+Pairing::Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& host) : guest_(guest), host_(host) {
+  need_sodium();
+  static_assert(crypto_core_ristretto255_HASHBYTES == 64 && crypto_core_ristretto255_BYTES == kShare);
+  crypto_generichash_state state;
+  ::crypto_generichash_init(&state, nullptr, 0, 64);
+  add(state, "osteotome tutor 1, generator");
+  add(state, tidy_code);
+  add(state, guest);
+  add(state, host);
+  std::array<std::uint8_t, 64> hash;
+  ::crypto_generichash_final(&state, hash.data(), hash.size());
+  std::array<std::uint8_t, kShare> generator;
+  ::crypto_core_ristretto255_from_hash(generator.data(), hash.data());
+  do {
+    ::crypto_core_ristretto255_scalar_random(secret_.data());
+  } while (::crypto_scalarmult_ristretto255(mine_.data(), secret_.data(), generator.data()) != 0);
+}
+
+std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const {
+  std::array<std::uint8_t, kShare> shared;
+  // Refuses what is no point, and gives the neutral one back as a failure.
+  if (::crypto_scalarmult_ristretto255(shared.data(), secret_.data(), theirs.data()) != 0) return std::nullopt;
+  PairKeys keys;
+  const auto derive = [&](std::string_view label, std::array<std::uint8_t, 32>& out) {
+    crypto_generichash_state state;
+    ::crypto_generichash_init(&state, shared.data(), shared.size(), out.size());
+    add(state, label);
+    add(state, guest_);
+    add(state, host_);
+    add(state, i_am_host ? theirs : mine_);
+    add(state, i_am_host ? mine_ : theirs);
+    ::crypto_generichash_final(&state, out.data(), out.size());
+  };
+  derive("osteotome tutor 1, to host", keys.to_host);
+  derive("osteotome tutor 1, to guest", keys.to_guest);
+  derive("osteotome tutor 1, confirm", keys.confirm);
+  return keys;
+}
+
+std::array<std::uint8_t, 16> proof(const PairKeys& keys, std::string_view label) {
+  std::array<std::uint8_t, 16> tag;
+  ::crypto_generichash(tag.data(), tag.size(), reinterpret_cast<const unsigned char*>(label.data()), label.size(), keys.confirm.data(),
+                       keys.confirm.size());
+  return tag;
+}
+
+bool same_proof(const std::array<std::uint8_t, 16>& a, std::span<const std::uint8_t> b) {
+  return b.size() == a.size() && ::sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+Bytes SecureChannel::seal(std::span<const std::uint8_t> plain) {
+  Bytes packet(plain.size() + kOverhead);
+  const std::uint64_t counter = ++sent_;
+  std::memcpy(packet.data(), &connection_, 4);
+  std::memcpy(packet.data() + 4, &counter, 8);
+  std::array<std::uint8_t, crypto_aead_chacha20poly1305_ietf_NPUBBYTES> nonce{};
+  std::memcpy(nonce.data(), &counter, 8);
+  unsigned long long written = 0;
+  ::crypto_aead_chacha20poly1305_ietf_encrypt(packet.data() + 12, &written, plain.data(), plain.size(), packet.data(), 12, nullptr,
+                                              nonce.data(), send_.data());
+  return packet;
+}
+
+std::optional<Bytes> SecureChannel::open(std::span<const std::uint8_t> packet) {
+  if (packet.size() < kOverhead || packet.size() > kMostPacketBytes + kOverhead) return std::nullopt;
+  std::uint32_t connection = 0;
+  std::uint64_t counter = 0;
+  std::memcpy(&connection, packet.data(), 4);
+  std::memcpy(&counter, packet.data() + 4, 8);
+  if (connection != connection_ || counter == 0) return std::nullopt;
+  // What is old costs no decryption.
+  const bool newer = counter > newest_;
+  if (!newer && (newest_ - counter >= kWindow || heard_[counter % kWindow])) return std::nullopt;
+  std::array<std::uint8_t, crypto_aead_chacha20poly1305_ietf_NPUBBYTES> nonce{};
+  std::memcpy(nonce.data(), &counter, 8);
+  Bytes plain(packet.size() - kOverhead);
+  unsigned long long written = 0;
+  if (::crypto_aead_chacha20poly1305_ietf_decrypt(plain.data(), &written, nullptr, packet.data() + 12, packet.size() - 12, packet.data(),
+                                                  12, nonce.data(), receive_.data()) != 0)
+    return std::nullopt;
+  if (newer) {
+    if (counter - newest_ >= kWindow) {
+      heard_.reset();
+    } else {
+      for (std::uint64_t c = newest_ + 1; c < counter; ++c) heard_.reset(c % kWindow);
+    }
+    newest_ = counter;
+  }
+  heard_.set(counter % kWindow);
+  return plain;
+}
+
+}  // namespace osteo::network

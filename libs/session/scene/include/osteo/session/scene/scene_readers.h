@@ -1,0 +1,39 @@
+// The readers that a scene may list.
+#pragma once
+#include <memory>
+
+#include "osteo/session/scene/dust_reader.h"
+#include "osteo/session/scene/heat_reader.h"
+#include "osteo/session/scene/pieces_reader.h"
+#include "osteo/session/scene/surface_reader.h"
+#include "osteo/session/scene/tool_counts.h"
+
+namespace osteo::inline session {
+
+struct ReaderList {
+  bool surface = true;
+  bool pieces = false;
+  bool dust = false;
+  bool heat = false;
+};
+
+/// What is not listed is null, and costs nothing.
+struct SceneReaders {
+  std::unique_ptr<SurfaceReader> surface;
+  std::unique_ptr<PiecesReader> pieces;
+  std::unique_ptr<DustReader> dust;
+  std::unique_ptr<HeatReader> heat;
+  ToolCounts tools;
+
+  /// For this scene as it is. `structures` (null: none), of which heat tells, must outlive this.
+  SceneReaders(const World& world, const ReaderList& list, double rate_hz, const Context& context,
+               const StructureMap* structures = nullptr);
+  /// All of them, which are of the hub's scene as it is.
+  void add_to(ReaderHub& hub);
+  /// Empty where the surface is not listed.
+  [[nodiscard]] std::string surface_hash() const { return surface ? surface->hash() : std::string(); }
+  /// Empty where pieces are not listed.
+  [[nodiscard]] std::vector<LiveComponents::Component> large_pieces() const;
+};
+
+}  // namespace osteo::session

@@ -1,0 +1,32 @@
+// What the tools did, in numbers for the summary.
+#pragma once
+#include <set>
+
+#include "osteo/session/scene/reader.h"
+
+namespace osteo::inline session {
+
+class ToolCounts final : public Reader {
+ public:
+  void scene_changed(const World& world, const World::Effect& effect) override;
+  void action(const SceneAction& action) override;
+  void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
+
+  /// By the saw, and crumbs of splits; what was taken back counts too.
+  [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
+  /// Actions that took something back.
+  [[nodiscard]] std::uint64_t undone() const { return undone_; }
+  /// Tools that have removed bone.
+  [[nodiscard]] const std::set<std::uint8_t>& burrs_used() const { return burrs_used_; }
+  /// Ticks in which bone was left that might have gone (kNoRoom).
+  [[nodiscard]] std::uint64_t ticks_without_room() const { return ticks_without_room_; }
+  /// Ticks in which the device gave no pose that could be used.
+  [[nodiscard]] std::uint64_t unusable_poses() const { return unusable_poses_; }
+
+ private:
+  double sawn_mm3_ = 0;
+  std::set<std::uint8_t> burrs_used_;
+  std::uint64_t undone_ = 0, ticks_without_room_ = 0, unusable_poses_ = 0;
+};
+
+}  // namespace osteo::session

@@ -1,0 +1,20 @@
+#include "osteo/session/scene/tool_counts.h"
+
+namespace osteo::inline session {
+
+void ToolCounts::scene_changed(const World& world, const World::Effect& effect) {
+  for (const auto& [name, density] : effect.dust)
+    sawn_mm3_ += static_cast<double>(density) * world.owner(name)->body->bone.frame().voxel_volume_mm3();
+}
+
+void ToolCounts::action(const SceneAction& action) {
+  undone_ += action.is(ActionKind::undo) ? 1 : 0;
+}
+
+void ToolCounts::tick(const TickRecord& record, std::span<const VoxelChange> /*changes*/) {
+  if (record.voxels_changed > 0) burrs_used_.insert(record.device.tool);
+  ticks_without_room_ += (record.flags & kNoRoom) != 0 ? 1 : 0;
+  unusable_poses_ += (record.flags & kPoseInvalid) != 0 ? 1 : 0;
+}
+
+}  // namespace osteo::session

@@ -1,0 +1,53 @@
+// How much bone lies inside a tool, exactly.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "osteo/simulation/bone/round_cone.h"
+#include "osteo/geometry/grid/brick_grid.h"
+
+namespace osteo::inline simulation {
+
+/// A voxel under the tool, and its part in what the tool removes: density times share covered times efficiency at that latitude.
+struct Hit {
+  VoxelKey voxel;
+  float weight;
+};
+
+struct OverlapResult {
+  double bone_mm3 = 0;     ///< integral of density over the shape, taking the bone in a voxel as spread through all of it
+  double sharp_mm3 = 0;    ///< the same, taking the bone in a voxel as ending at a plane: what contact begins with
+  Vec3 area_mm2;           ///< integral of density times outward normal over its surface: the gradient of bone_mm3 for moves of the shape
+  double surface_mm2 = 0;  ///< integral of density over the surface: how much of it touches bone
+  Vec3 area_foot_mm3;      ///< the same times the foot on the axis: the torque of a uniform pressure is -cross(axis, this)
+  double weight_mm3 = 0;   ///< bone_mm3 weighted by efficiency; only when hits were asked for
+};
+
+/// Sums over the voxels of bone near the shape: each contributes its density times the share of its cube that the shape covers. The
+/// shape's surface is a plane within a voxel, moved for the mean of its curvature: volume within 0.1 % from a radius of 2 voxels on, 1 %
+/// at one voxel. No samples, no steps: everything is continuous in the pose.
+/// The grid's voxels must be cubes. Cost: about 8 ns for a row of 8 voxels at the surface, 2 ns inside; air costs nothing.
+class Overlap {
+ public:
+  /// `most_hits`: room for that many, made once. Shapes longer than a few voxels are walked along their axis.
+  explicit Overlap(std::size_t most_hits);
+  ~Overlap();
+  Overlap(const Overlap&) = delete;
+  Overlap& operator=(const Overlap&) = delete;
+  /// `start_mm`: the start of the shape's axis in the world, its own start_mm not counted; `axis` unit. With `want_hits` every
+  /// `stride`-th row of voxels is listed, which ones depends on `phase`. No allocation.
+  OverlapResult measure(const BrickGrid& bone, const RoundCone& shape, Vec3 start_mm, Vec3 axis, bool want_hits = false,
+                        double falloff_per_rad = 0, std::uint32_t stride = 1, std::uint32_t phase = 0) noexcept;
+  /// Of the last measure(): ascending within a brick, each voxel once.
+  [[nodiscard]] std::span<const Hit> hits() const { return {hits_.data(), count_}; }
+
+ private:
+  std::vector<Hit> hits_;
+  std::size_t count_ = 0;
+  struct PartialBuffer;
+  std::unique_ptr<PartialBuffer> partial_;
+};
+
+}  // namespace osteo::simulation

@@ -1,0 +1,115 @@
+#include "osteo/simulation/haptics/guard.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "osteo/simulation/haptics/stream.h"
+
+namespace osteo::inline simulation {
+namespace {
+
+// Also of the square of its length, so that nothing overflows on the way.
+Vec3 finite(Vec3 v) {
+  return std::isfinite(dot(v, v)) ? v : Vec3{};
+}
+Vec3 direction(Vec3 v) {
+  const double n2 = dot(v, v);
+  return std::abs(n2 - 1) < 1e-6 ? v : normalized(finite(v));
+}
+// A limit that is not a number is the strictest.
+double limit_of(double value) {
+  return value > 0 ? value : 0;
+}
+
+}  // namespace
+
+double safe_stiffness_n_per_mm(const DeviceTraits& d, double contact_damping_n_s_per_m, double tick_s) {
+  const double bound = (d.damping_n_s_per_m + contact_damping_n_s_per_m) / (tick_s / 2 + d.delay_s);
+  const double share = d.encoder_mm > 0 ? 0.25 : 0.5;
+  return limit_of(std::min(limit_of(share * bound / 1000), limit_of(d.max_stiffness_n_per_mm)));
+}
+
+double PassivityControl::update(Vec3 x_mm, Vec3 elastic_n, Vec3 velocity_mm_s, double dt_s, double encoder_mm, double most) noexcept {
+  if (started_) energy_mj_ += dot(last_force_n_, x_mm - last_x_mm_);
+  started_ = true;
+  last_x_mm_ = x_mm;
+  if (elastic_n == Vec3{} || !std::isfinite(energy_mj_)) {
+    energy_mj_ = 0;
+    return 0;
+  }
+  // Half an encoder step at each end of a cycle, and what adds up over a few, may be feigned.
+  const double feigned = 4 * encoder_mm * length(elastic_n), speed2 = dot(velocity_mm_s, velocity_mm_s);
+  const double least = encoder_mm > 0 ? encoder_mm / (16 * dt_s) : 1e-6;
+  if (energy_mj_ <= feigned || speed2 < least * least) return 0;
+  // Damping alpha takes alpha v^2 dt out in the tick to come: mJ = N mm; alpha in N s/mm here.
+  return std::min((energy_mj_ - feigned) / (speed2 * dt_s) * 1000, most);
+}
+
+Guard::Guard(const GuardParams& params, const DeviceTraits& device) : device_(device) {
+  set(params);
+}
+
+void Guard::set(const GuardParams& params) noexcept {
+  params_ = params;
+  most_n_ = std::min(limit_of(params.max_force_n), limit_of(device_.max_force_n));
+}
+
+Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
+  Output out;
+  const double dt = std::isfinite(dt_s) && dt_s > 0 ? dt_s : 1e-3;
+  const bool placed = std::isfinite(dot(in.position_mm, in.position_mm));
+  if (in.jumped || !placed) {
+    moving_ = false;
+    passivity_.reset();
+    resume_ = 0;
+    out.flags |= kPoseJumped;
+  }
+  // From one tick to the next, in encoder steps or not: the steps average out, while any smoothing would come late, and damping by a
+  // late velocity drives what it should damp.
+  const Vec3 at = placed ? in.position_mm : last_x_mm_;
+  velocity_ = moving_ ? finite((at - last_x_mm_) / dt) : Vec3{};
+  last_x_mm_ = at;
+  moving_ = true;
+  double share = resume_;
+  if (!(in.age_ms <= params_.stale_ms)) {
+    // The hand may be anywhere by now.
+    share = std::min(share, std::max(0.0, 1 - (in.age_ms - params_.stale_ms) / params_.fade_ms));
+    resume_ = std::min(resume_, share);
+    out.flags |= kPoseStale;
+  } else if (resume_ < 1) {
+    resume_ = params_.resume_s > 0 ? std::min(1.0, resume_ + dt / params_.resume_s) : 1.0;
+    share = resume_;
+  }
+  const Vec3 elastic = finite(in.elastic_n) * share;
+  Vec3 force = elastic;
+  if (!(elastic == Vec3{})) {
+    // Damping may slow the hand's way out, but never hold it.
+    const Vec3 normal = direction(in.normal);
+    const double damping = params_.contact_damping_n_s_per_m / 1000 * dot(velocity_, normal) * share;
+    force -= normal * std::min(damping, std::max(0.0, dot(elastic, normal)));
+  }
+  if (params_.passivity) {
+    const double alpha = passivity_.update(at, elastic, velocity_, dt, device_.encoder_mm, params_.max_damping_n_s_per_m);
+    if (alpha > 0) {
+      force -= velocity_ * (alpha / 1000);
+      out.flags |= kPassivity;
+    }
+  }
+  const Vec3 effects = finite(in.effects_n) * share;
+  force = finite(force + effects);
+  if (const double n = length(force); n > most_n_) {
+    force = force * (most_n_ / n);
+    out.flags |= kForceCapped;
+  }
+  const Vec3 change = force - last_force_n_;
+  if (const double n = length(change), allowed = limit_of(params_.max_rate_n_per_s * dt); params_.max_rate_n_per_s != 0 && n > allowed) {
+    force = last_force_n_ + change * (allowed / n);
+    out.flags |= kRateCapped;
+  }
+  last_force_n_ = force;
+  passivity_.applied(force - effects);
+  out.force_n = force;
+  return out;
+}
+
+}  // namespace osteo::simulation
