@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Who includes whom is what libs/layers.txt says, no more and no less; architecture.md shows the same; no public header has a heavy one, no two types have one name."""
+"""Who includes whom is what libs/layers.txt says of areas and libraries, no more and no less; architecture.md shows the same; no public header has a
+heavy one, no two types have one name."""
 import pathlib, re, sys
 
 root = pathlib.Path(sys.argv[1])
@@ -13,37 +14,56 @@ json_still = {"libs/session/scene/src/session_folder.cpp", "libs/session/recordi
               "libs/app/window/src/window_state.cpp"}
 bad = []
 
-# The table: library -> (may be included by its headers, by its sources only).
-table = {}
+# The table: area -> areas it may use; library -> (may be included by its headers, by its sources only).
+table, areas, area_of, area = {}, {}, {}, None
 for line in (root / "libs/layers.txt").read_text().splitlines():
     if not line or line.startswith("#"):
         continue
+    if m := re.fullmatch(r"== (\w+) \|([\w ]*)", line):
+        area = m[1]
+        areas[area] = m[2].split()
+        bad += [f"libs/layers.txt: {area} may use {a}, which does not stand above it" for a in areas[area] if a not in areas]
+        continue
     m = re.fullmatch(r"(\w+) +([\w ]*)\|([\w ]*)", line)
-    if not m:
+    if not m or not area:
         sys.exit(f"libs/layers.txt: cannot read '{line}'")
     public, private = m[2].split(), m[3].split()
     for other in public + private:
         if other not in table:
             bad.append(f"libs/layers.txt: {m[1]} lists {other}, which does not stand above it")
+        elif area_of[other] not in [area, *areas[area]]:
+            bad.append(f"libs/layers.txt: {m[1]} lists {other}, but {area} may not use {area_of[other]}")
         if (public + private).count(other) > 1:
             bad.append(f"libs/layers.txt: {m[1]} lists {other} twice")
-    table[m[1]] = (set(public), set(private))
+    table[m[1]], area_of[m[1]] = (set(public), set(private)), area
+for area, others in areas.items():
+    used = {area_of[o] for lib, (public, private) in table.items() if area_of[lib] == area for o in public | private if o in area_of}
+    bad += [f"libs/layers.txt: nothing of {area} uses {other}" for other in others if other not in used]
 
-# The includes.
-for lib in sorted(p.name for p in (root / "libs").iterdir() if p.is_dir() and p.name != "cmake"):
-    if lib not in table:
-        bad.append(f"libs/{lib} has no row in libs/layers.txt")
+# The includes, and the namespace of each file: `osteo::inline AREA`, of core `osteo`.
+for folder in sorted(p for p in (root / "libs").glob("*/*") if p.is_dir() and p.parent.name != "cmake"):
+    area, lib = folder.parent.name, folder.name
+    if area_of.get(lib) != area:
+        bad.append(f"libs/{area}/{lib} has no row below '== {area}' in libs/layers.txt")
         continue
     in_headers, in_sources = {}, {}
-    for path in (root / "libs" / lib).rglob("*"):
+    for path in folder.rglob("*"):
         if path.suffix not in (".h", ".cpp"):
             continue
         name = path.relative_to(root).as_posix()
         public = "/include/" in name
-        for line in path.read_text().splitlines():
-            m = re.match(r'#include "osteo/(\w+)/', line)
-            if m and m[1] != lib:
-                (in_headers if public else in_sources).setdefault(m[1], name)
+        text = path.read_text()
+        for m in re.finditer(r"^namespace osteo\b([^{;=]*)\{(?:\s*(?:class|struct) \w+;)*\s*\}?", text, re.M):
+            wanted = "" if area == "core" else f"::inline {area}"
+            forward = m[0].endswith("}")  # a type of another area, declared
+            if not forward and name not in for_sources_only and not (m[1].strip() + "::").startswith(wanted + "::"):
+                bad.append(f"{name}: 'namespace osteo{m[1].strip()}'; in {area} it is 'osteo{wanted}'")
+        for line in text.splitlines():
+            m = re.match(r'#include "osteo/(\w+)/(\w+)/', line)
+            if m and area_of.get(m[2]) != m[1]:
+                bad.append(f"{name}: {line}: there is no libs/{m[1]}/{m[2]}")
+            elif m and m[2] != lib:
+                (in_headers if public else in_sources).setdefault(m[2], name)
             h = heavy.match(line)
             if public and h and name not in for_sources_only and not (h[1] == "vtk" and lib in shows_vtk):
                 bad.append(f"{name}: {line}")
@@ -54,10 +74,10 @@ for lib in sorted(p.name for p in (root / "libs").iterdir() if p.is_dir() and p.
     public, private = table[lib]
     for other, name in in_headers.items():
         if other not in public:
-            bad.append(f"{name}: a public header of libs/{lib} may not include libs/{other} (libs/layers.txt)")
+            bad.append(f"{name}: a public header of {lib} may not include {other} (libs/layers.txt)")
     for other, name in in_sources.items():
         if other not in public | private:
-            bad.append(f"{name}: libs/{lib} may not include libs/{other} (libs/layers.txt)")
+            bad.append(f"{name}: {lib} may not include {other} (libs/layers.txt)")
     for other in sorted(public - in_headers.keys()):
         bad.append(f"libs/layers.txt: no public header of {lib} includes {other}")
     for other in sorted(private - in_sources.keys()):
@@ -66,17 +86,24 @@ for name in sorted(json_still):
     if not (root / name).exists() or "nlohmann" not in (root / name).read_text():
         bad.append(f"tests/layering.py: {name} needs no exception any more")
 for lib in table:
-    if not (root / "libs" / lib).is_dir():
-        bad.append(f"libs/layers.txt: there is no libs/{lib}")
+    if not (root / "libs" / area_of[lib] / lib).is_dir():
+        bad.append(f"libs/layers.txt: there is no libs/{area_of[lib]}/{lib}")
 
-# CMake: one declaration a library, in the table's order, its links from the table alone.
-cmake = (root / "libs/CMakeLists.txt").read_text()
-declared = re.findall(r"^ *osteo_library\((\w+)", cmake, re.M)
-if declared != list(table):
-    bad.append(f"libs/CMakeLists.txt declares {' '.join(declared)}; libs/layers.txt has {' '.join(table)}")
-for line in cmake.splitlines():
-    if re.search(r"osteo::", line):
-        bad.append(f"libs/CMakeLists.txt: '{line.strip()}': links between libraries come from libs/layers.txt")
+# CMake: one declaration a library, in the table's order, its links from the table alone. Each area has a page.
+for area in areas:
+    cmake = (root / "libs" / area / "CMakeLists.txt").read_text()
+    declared = re.findall(r"^ *osteo_library\((\w+)", cmake, re.M)
+    rows = [lib for lib in table if area_of[lib] == area]
+    if declared != rows:
+        bad.append(f"libs/{area}/CMakeLists.txt declares {' '.join(declared)}; libs/layers.txt has {' '.join(rows)}")
+    for line in cmake.splitlines():
+        if re.search(r"osteo::", line):
+            bad.append(f"libs/{area}/CMakeLists.txt: '{line.strip()}': links between libraries come from libs/layers.txt")
+    readme = root / "libs" / area / "README.md"
+    if not readme.exists():
+        bad.append(f"libs/{area}/README.md is missing: what the area is for, its libraries, where to begin, what may not be done in it")
+    else:
+        bad += [f"libs/{area}/README.md does not name {lib}" for lib in rows if f"`{lib}`" not in readme.read_text()]
 
 # The page that shows it: | library | includes | holds |
 page = (root / "docs/architecture.md").read_text()
@@ -88,7 +115,7 @@ for lib, (public, private) in table.items():
         bad.append(f"docs/architecture.md: {lib} includes {' '.join(shown[lib])}; libs/layers.txt says {' '.join(sorted(public | private))}")
 if [lib for lib in shown if lib in table] != list(table):
     bad.append("docs/architecture.md: the rooms stand in another order than in libs/layers.txt")
-for lib in shown.keys() - table.keys() - {"library"}:
+for lib in shown.keys() - table.keys() - {"library", "area"}:
     bad.append(f"docs/architecture.md: there is no library {lib}")
 
 # One name, one type: two of the same name in different files of a namespace are one to the linker, which takes either's functions.
@@ -107,12 +134,12 @@ for path in sorted([*(root / "libs").rglob("*"), *(root / "apps").rglob("*")]):
             scopes.pop()
         opens = None
         if m[0].startswith("namespace"):
-            opens = " ".join(m[0].split()[1:]) or None  # what stands in one without a name is the file's own
+            opens = " ".join(w for w in m[0].replace("::inline ", "::").split()[1:]) or None  # what stands in one without a name is the file's own
         elif (n := named.match(m[0].strip())) and text[m.end()] == "{" and all(scopes):
             defined.setdefault("::".join([*scopes, n[1]]), set()).add(path.relative_to(root).as_posix())
 for name, where in sorted(defined.items()):
     if len(where) > 1:
         bad.append(f"{name} is defined in {' and in '.join(sorted(where))}: one of them needs another name")
 
-print("\n".join(bad) or f"{len(table)} libraries, each includes and links what libs/layers.txt says")
+print("\n".join(bad) or f"{len(areas)} areas, {len(table)} libraries, each includes and links what libs/layers.txt says")
 sys.exit(bool(bad))

@@ -32,8 +32,8 @@ if(commit STREQUAL "")
 else()
   set(commit "commit ${commit}")
 endif()
-file(CONFIGURE OUTPUT ${OUT} @ONLY CONTENT "namespace osteo {
+file(CONFIGURE OUTPUT ${OUT} @ONLY CONTENT "namespace osteo::inline imaging {
 extern const char* const kCommit;
 const char* const kCommit = \"${commit}\";
-}  // namespace osteo
+}  // namespace osteo::imaging
 ")

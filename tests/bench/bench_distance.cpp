@@ -9,7 +9,7 @@
 #include "osteo/geometry/distance/mask_distance.h"
 #include "osteo/geometry/distance/swept_distance.h"
 #include "osteo/geometry/distance/thesis_distance.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::bench {

@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
   }
   EditDocument& d = *made;
   const Vec3 c = ct.frame.centre_mm();
-  const auto step = [&](const char* name, const Operation& o) {
+  const auto step = [&](const char* name, const EditOperation& o) {
     EditOutcome done;
     std::optional<BonePlan> plan;
     const std::size_t before = d.history_bytes();

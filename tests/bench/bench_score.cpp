@@ -8,7 +8,7 @@
 
 #include "osteo/assessment/evidence/product.h"
 #include "osteo/assessment/evidence/score.h"
-#include "osteo/session/scene/hint_reader.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/scene/session_folder.h"
 
 using namespace osteo;

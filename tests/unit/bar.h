@@ -2,7 +2,7 @@
 #pragma once
 #include <cmath>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "soft_solid.h"
 
 namespace osteo::test {

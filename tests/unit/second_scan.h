@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/core/data/volume.h"
 #include "osteo/imaging/image/head_anatomy.h"
 

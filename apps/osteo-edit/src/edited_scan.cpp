@@ -10,7 +10,7 @@
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
 #include "osteo/session/scene/recipe.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

@@ -10,13 +10,14 @@
 #include <thread>
 
 #include "batch_command.h"
-#include "commands.h"
+#include "commands/prepare.h"
+#include "program.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/io/surface_io.h"
 #include "osteo/imaging/pipeline/pipeline.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

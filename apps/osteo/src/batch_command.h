@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
+#include "commands/prepare.h"
 #include "osteo/core/base/files.h"
 #include "osteo/app/cli/command.h"
 

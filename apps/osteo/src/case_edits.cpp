@@ -67,7 +67,7 @@ void add_edits(Pipeline& pipeline, const CaseEdits& edits, const fs::path& folde
   node.inputs["mask"] = at.mask;
   node.inputs["edits"].file = edits.file;
   node.outputs["edits"] = folder / "edits.json";
-  bool structures = std::any_of(edits.recipe.operations.begin(), edits.recipe.operations.end(), [](const Operation& o) {
+  bool structures = std::any_of(edits.recipe.operations.begin(), edits.recipe.operations.end(), [](const EditOperation& o) {
     return std::holds_alternative<AddStructureEdit>(o) || std::holds_alternative<ChangeStructureEdit>(o);
   });
   for (PipelineNode& n : pipeline.nodes) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/io/volume_io.h"

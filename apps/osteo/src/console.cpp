@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "commands.h"
+#include "commands/console.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/network/wire/server.h"

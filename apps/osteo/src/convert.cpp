@@ -5,7 +5,8 @@
 #include <ostream>
 
 #include "bench_subjects.h"
-#include "commands.h"
+#include "commands/bench.h"
+#include "commands/convert.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

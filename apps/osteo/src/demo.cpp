@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/demo.h"
+#include "commands/prepare.h"
+#include "commands/rehearse.h"
+#include "commands/replay.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/imaging/dicom/save_series.h"

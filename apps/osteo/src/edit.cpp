@@ -4,7 +4,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "commands.h"
+#include "commands/edit.h"
+#include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/session/scene/case.h"

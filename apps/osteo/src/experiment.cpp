@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/experiment.h"
 #include "experiment_force.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"

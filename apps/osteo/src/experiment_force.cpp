@@ -7,7 +7,7 @@
 #include <ostream>
 #include <set>
 
-#include "commands.h"
+#include "commands/experiment.h"
 #include "experiment_force.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"

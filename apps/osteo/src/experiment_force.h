@@ -1,6 +1,6 @@
 // Force-skill training, as 'osteo experiment' has it.
 #pragma once
-#include "commands.h"
+#include "commands/experiment.h"
 
 namespace osteo {
 

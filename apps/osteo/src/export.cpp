@@ -1,7 +1,7 @@
 // osteo export: a session as files that others read.
 #include <ostream>
 
-#include "commands.h"
+#include "commands/export.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/app/cli/report.h"

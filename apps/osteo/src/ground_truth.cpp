@@ -3,7 +3,7 @@
 #include <chrono>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/ground_truth.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

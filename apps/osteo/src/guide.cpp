@@ -5,7 +5,7 @@
 #include <sstream>
 #include <vector>
 
-#include "commands.h"
+#include "commands/guide.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "commands.h"
+#include "commands/heat.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json.h"

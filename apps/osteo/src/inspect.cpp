@@ -5,7 +5,9 @@
 #include <ostream>
 
 #include "case_pipeline.h"
-#include "commands.h"
+#include "commands/info.h"
+#include "commands/list.h"
+#include "commands/series.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -1,6 +1,6 @@
 #include <iostream>
 
-#include "commands.h"
+#include "program.h"
 
 int main(int argc, char** argv) {
   osteo::cli::Program program = osteo::make_osteo_program();

@@ -3,7 +3,10 @@
 #include <ostream>
 #include <vector>
 
-#include "commands.h"
+#include "commands/calibrate_camera.h"
+#include "commands/calibrate_pen.h"
+#include "commands/markers.h"
+#include "commands/track_pen.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/monitor.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

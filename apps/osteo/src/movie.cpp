@@ -7,7 +7,7 @@
 #include <ostream>
 #include <random>
 
-#include "commands.h"
+#include "commands/movie.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

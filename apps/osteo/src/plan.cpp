@@ -1,7 +1,7 @@
 // osteo plan: where a session left pieces and plates, for whoever operates.
 #include <ostream>
 
-#include "commands.h"
+#include "commands/plan.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -6,7 +6,8 @@
 #include <cstring>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/playback.h"
+#include "commands/replay.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -5,14 +5,14 @@
 
 #include "case_edits.h"
 #include "case_pipeline.h"
-#include "commands.h"
+#include "commands/prepare.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/app/cli/report.h"
 #include "osteo/imaging/dicom/verdict.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

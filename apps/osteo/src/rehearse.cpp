@@ -6,7 +6,7 @@
 #include <ostream>
 #include <thread>
 
-#include "commands.h"
+#include "commands/rehearse.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

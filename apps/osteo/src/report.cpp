@@ -2,7 +2,8 @@
 #include <ostream>
 
 #include "case_pipeline.h"
-#include "commands.h"
+#include "commands/approve.h"
+#include "commands/report.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -10,7 +11,7 @@
 #include "osteo/session/scene/approval.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <ostream>
 
-#include "commands.h"
+#include "commands/review.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 

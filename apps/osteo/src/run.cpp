@@ -1,7 +1,9 @@
 // run and docs.
 #include <ostream>
 
-#include "commands.h"
+#include "commands/docs.h"
+#include "commands/run.h"
+#include "program.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/scene.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

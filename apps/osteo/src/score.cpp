@@ -4,10 +4,10 @@
 #include <cmath>
 #include <ostream>
 
-#include "commands.h"
+#include "commands/score.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
-#include "osteo/session/scene/heat_score.h"
+#include "osteo/assessment/scoring/heat_score.h"
 #include "osteo/session/scene/session_folder.h"
 #include "osteo/session/recording/simulated.h"
 

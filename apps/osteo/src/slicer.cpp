@@ -4,7 +4,9 @@
 #include <ostream>
 
 #include "case_edits.h"
-#include "commands.h"
+#include "commands/hand_over.h"
+#include "commands/prepare.h"
+#include "commands/take_back.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"
@@ -14,7 +16,7 @@
 #include "osteo/imaging/io/volume_io.h"
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/hand_over.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

@@ -3,7 +3,7 @@
 #include <ostream>
 #include <set>
 
-#include "commands.h"
+#include "commands/study.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

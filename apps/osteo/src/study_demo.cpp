@@ -5,8 +5,8 @@
 #include <mutex>
 #include <ostream>
 
-#include "commands.h"
-#include "mastoid_window.h"
+#include "commands/prepare.h"
+#include "built_in_pipelines.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

@@ -5,7 +5,9 @@
 #include <thread>
 #include <tuple>
 
-#include "commands.h"
+#include "commands/join.h"
+#include "commands/playback.h"
+#include "commands/tutor.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/core/base/json_document.h"

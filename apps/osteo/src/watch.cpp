@@ -11,7 +11,7 @@
 #include "osteo/hospital/pacs/orthanc.h"
 #include "osteo/imaging/pipeline/pipeline.h"
 #include "pacs_commands.h"
-#include "temporal_bone_pipeline.h"
+#include "built_in_pipelines.h"
 
 namespace osteo {
 namespace {

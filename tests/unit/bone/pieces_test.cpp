@@ -5,7 +5,7 @@
 
 #include "bar.h"
 #include "osteo/simulation/bone/pieces.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/saw.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 #include "osteo/geometry/mesh/mesh_info.h"

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "scene.h"
 
 namespace osteo {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "cavity.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "scene.h"
 
 namespace osteo {

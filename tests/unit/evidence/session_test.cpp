@@ -9,7 +9,7 @@
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/session/scene/rehearsal.h"
-#include "osteo/session/scene/score_reader.h"
+#include "osteo/assessment/scoring/score_reader.h"
 #include "osteo/session/recording/apply.h"
 #include "scene.h"
 #include "scratch.h"

@@ -6,7 +6,7 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/imaging/image/components.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/image/threshold.h"
 

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/imaging/image/phantom.h"
 #include "osteo/imaging/segment/ear.h"
 

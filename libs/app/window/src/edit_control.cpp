@@ -51,7 +51,7 @@ EditControl::EditControl(EditDocument& document)
     lowest = std::min(lowest, static_cast<int>(*std::min_element(row + r.begin, row + r.end)));
   }
   if (lowest < 32767) lower_hu = lowest;
-  for (const Operation& o : document_.operations()) {
+  for (const EditOperation& o : document_.operations()) {
     if (const auto* const t = std::get_if<ThresholdEdit>(&o)) {
       lower_hu = t->lower_hu;
       upper_hu = t->upper_hu;
@@ -279,7 +279,7 @@ void EditControl::set_threshold(double lower, double upper) {
   redraw_ = true;
 }
 
-void EditControl::start(std::vector<Operation> operations) {
+void EditControl::start(std::vector<EditOperation> operations) {
   if (refuse_when_busy()) return;
   if (document_.in_stroke()) told(document_.end_stroke());
   message_ = operation_text(operations.front()) + " ...";
@@ -290,7 +290,7 @@ void EditControl::apply(BoxChoice choice) {
   switch (tool_) {
     case EditTool::threshold: {
       const ThresholdEdit t = *live();
-      start(later_steps_again ? document_.with_later_steps(t) : std::vector<Operation>{t});
+      start(later_steps_again ? document_.with_later_steps(t) : std::vector<EditOperation>{t});
       break;
     }
     case EditTool::pieces:
@@ -310,7 +310,7 @@ void EditControl::apply(BoxChoice choice) {
   }
 }
 
-bool EditControl::at_once(const Operation& operation) {
+bool EditControl::at_once(const EditOperation& operation) {
   if (refuse_when_busy()) return false;
   try {
     told(document_.apply(operation));

@@ -68,9 +68,9 @@ class EditControl {
   /// What Enter does with the tool; of a box as `choice` says.
   void apply(BoxChoice choice = BoxChoice::clear_inside);
   /// Something to be worked out beside the window.
-  void start(std::vector<Operation> operations);
+  void start(std::vector<EditOperation> operations);
   /// What is done at once: structures. False, with a message, where it is refused.
-  bool at_once(const Operation& operation);
+  bool at_once(const EditOperation& operation);
   bool add_structure(const std::string& name);
   void undo();
   void redo();

@@ -71,7 +71,7 @@ EditWorker::~EditWorker() {
   previewer_.join();
 }
 
-bool EditWorker::plan(const EditDocument& document, std::vector<Operation> operations) {
+bool EditWorker::plan(const EditDocument& document, std::vector<EditOperation> operations) {
   if (planning_) return false;
   planning_ = true;
   {

@@ -48,7 +48,7 @@ class EditWorker {
   EditWorker& operator=(const EditWorker&) = delete;
 
   /// Works out operations on bone. The document must stay as it is until `take_plan` gives something; false when one is at work.
-  bool plan(const EditDocument& document, std::vector<Operation> operations);
+  bool plan(const EditDocument& document, std::vector<EditOperation> operations);
   [[nodiscard]] bool planning() const { return planning_; }
   [[nodiscard]] double progress() const { return progress_.load(); }
   /// It ends soon, with an Error(cancelled).
@@ -74,7 +74,7 @@ class EditWorker {
   bool planning_ = false;  // the window's
   struct Job {
     const EditDocument* document;
-    std::vector<Operation> operations;
+    std::vector<EditOperation> operations;
   };
   std::optional<Job> job_;
   std::optional<Planned> planned_;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/session/scene/hint_reader.h"
+#include "osteo/assessment/scoring/hint_reader.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/app/window/person_settings.h"
 #include "room_layout.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/saw.h"
 #include "osteo/simulation/camera/microscope.h"
 #include "osteo/simulation/haptics/stream.h"

@@ -5,7 +5,7 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/assessment/evidence/product.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "product_lattice.h"
 
 namespace osteo::inline assessment {

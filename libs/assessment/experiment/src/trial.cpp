@@ -17,7 +17,7 @@ std::string trial_name(int number) {
   std::snprintf(name, sizeof name, "trial-%02d", number);
   return name;
 }
-double rounded(double v, double digits = 1e6) {
+double rounded_to(double v, double digits = 1e6) {
   return std::round(v * digits) / digits;
 }
 template <class E>
@@ -38,7 +38,7 @@ std::vector<double> at_rate(const std::vector<double>& values, double seconds, d
   const auto count = static_cast<std::size_t>(std::floor(seconds * rate_hz)) + 1;
   for (std::size_t k = 0; k < count; ++k) {
     const double at = static_cast<double>(k) / rate_hz / seconds * static_cast<double>(values.size() - 1);
-    out.push_back(rounded(values[std::min(static_cast<std::size_t>(std::lround(at)), values.size() - 1)], 1e3));
+    out.push_back(rounded_to(values[std::min(static_cast<std::size_t>(std::lround(at)), values.size() - 1)], 1e3));
   }
   return out;
 }
@@ -196,10 +196,10 @@ TrialScore save_trial(const fs::path& folder, const std::string& participant, co
                {"by", name_of_enum(r.mover)},
                {"device", r.device},
                {"simulated", r.mover == Mover::simulated},
-               {"gains", Json{{"path_n_per_mm", rounded(r.gains.path_n_per_mm)},
-                              {"path_n_s_per_mm", rounded(r.gains.path_n_s_per_mm)},
-                              {"plane_n_per_mm", rounded(r.gains.plane_n_per_mm)},
-                              {"plane_n_s_per_mm", rounded(r.gains.plane_n_s_per_mm)}}},
+               {"gains", Json{{"path_n_per_mm", rounded_to(r.gains.path_n_per_mm)},
+                              {"path_n_s_per_mm", rounded_to(r.gains.path_n_s_per_mm)},
+                              {"plane_n_per_mm", rounded_to(r.gains.plane_n_per_mm)},
+                              {"plane_n_s_per_mm", rounded_to(r.gains.plane_n_s_per_mm)}}},
                {"score", s.recall.score},
                {"phase_s", s.recall.phase_s},
                {"lag_s", s.recall.lag_s},

@@ -19,7 +19,7 @@ Tone tone_of(FindingSeverity s) {
                                          : Tone::plain;
 }
 
-const ReviewPicture* picture_of(const Review& r, std::string_view id) {
+const ReviewPicture* picture_with(const Review& r, std::string_view id) {
   const auto at = std::find_if(r.pictures.begin(), r.pictures.end(), [&](const ReviewPicture& p) { return p.id == id; });
   return at == r.pictures.end() ? nullptr : &*at;
 }
@@ -118,7 +118,7 @@ Sheet review_sheet(const Review& r) {
   const auto row = [&](const char* heading, std::initializer_list<const char*> ids, double height_mm) {
     sheet::Pictures pictures{{}, height_mm};
     for (const char* const id : ids) {
-      if (const ReviewPicture* const p = picture_of(r, id)) pictures.row.push_back({p->id, p->picture, p->caption});
+      if (const ReviewPicture* const p = picture_with(r, id)) pictures.row.push_back({p->id, p->picture, p->caption});
     }
     if (pictures.row.empty()) return;
     s.blocks.push_back({sheet::Heading{heading}});
@@ -138,7 +138,7 @@ Sheet review_sheet(const Review& r) {
     evidence.row.clear();
   };
   for (const ScoreFinding& f : r.findings.list) {
-    const ReviewPicture* const p = picture_of(r, f.id);
+    const ReviewPicture* const p = picture_with(r, f.id);
     if (p == nullptr) continue;
     evidence.row.push_back({p->id, p->picture, p->caption});
     if (evidence.row.size() == 3) flush();

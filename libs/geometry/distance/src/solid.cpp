@@ -51,7 +51,7 @@ std::vector<Layer> layers_of(const TriangleSoup& soup) {
 }
 
 // Of a triangle seen from p, over 4 pi; positive from behind. A. van Oosterom, J. Strackee 1983.
-double solid_angle(Vec3 a, Vec3 b, Vec3 c, Vec3 p) {
+double corner_solid_angle(Vec3 a, Vec3 b, Vec3 c, Vec3 p) {
   a = a - p;
   b = b - p;
   c = c - p;
@@ -113,7 +113,7 @@ std::optional<SolidSurface> solid_of(const TriangleSoup& input, const Context& c
     double others = 0;
     for (std::uint32_t s = 0; s < layers.size(); ++s) {
       if (s != found.first && layers[s].net != 0)
-        others += layers[s].net * solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
+        others += layers[s].net * corner_solid_angle(corner(layers[s], 0), corner(layers[s], 1), corner(layers[s], 2), p);
     }
     const double behind = others + own.net / 2.0, before = others - own.net / 2.0;
     const auto inside = [](double w) { return std::abs(w) > 0.5; };

@@ -14,7 +14,7 @@ namespace {
 
 using pacs::text_of;
 
-constexpr std::size_t kMostSeries = 10'000;
+constexpr std::size_t kMaxFetchedSeries = 10'000;
 
 OFList<OFString> uncompressed() {
   OFList<OFString> list;
@@ -139,7 +139,7 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
   if (by_series_alone) {
     of.emplace_back("", "");  // many nodes answer all the same
   } else {
-    for (const auto& study : query.ask(studies, kMostSeries))
+    for (const auto& study : query.ask(studies, kMaxFetchedSeries))
       of.emplace_back(text_of(*study, DCM_StudyInstanceUID), text_of(*study, DCM_StudyDate));
   }
   for (const auto& [uid, date] : of) {
@@ -152,7 +152,7 @@ std::vector<RemoteSeries> find_series(const DicomPeer& peer, const SeriesKeys& k
     q.putAndInsertString(DCM_SeriesNumber, "");
     q.putAndInsertString(DCM_SeriesDescription, "");
     q.putAndInsertString(DCM_NumberOfSeriesRelatedInstances, "");
-    for (const auto& s : query.ask(q, kMostSeries)) {
+    for (const auto& s : query.ask(q, kMaxFetchedSeries)) {
       RemoteSeries r{text_of(*s, DCM_StudyInstanceUID),
                      text_of(*s, DCM_SeriesInstanceUID),
                      text_of(*s, DCM_Modality),

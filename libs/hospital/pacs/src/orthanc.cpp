@@ -19,8 +19,8 @@
 namespace osteo::inline hospital {
 namespace {
 
-constexpr std::size_t kMostText = 64'000'000;  // bytes of an answer: 1 kB for each of 64,000 objects
-constexpr int kPage = 200;                     // changes
+constexpr std::size_t kMaxAnswerBytes = 64'000'000;  // bytes of an answer: 1 kB for each of 64,000 objects
+constexpr int kChangesPerPage = 200;                     // changes
 constexpr int kTries = 3;                      // of a series whose objects are wrong
 constexpr const char* kState = ".orthanc.json";
 
@@ -50,7 +50,7 @@ class Rest {
 
   /// None: the server has no such thing (any more).
   std::optional<Json> ask(const std::string& path) {
-    const pacs::Reply reply = http_.ask({.path = path, .accept = {}, .most = kMostText});
+    const pacs::Reply reply = http_.ask({.path = path, .accept = {}, .most = kMaxAnswerBytes});
     if (!good(reply)) return std::nullopt;
     auto said = Json::parse(reply.text);
     if (!said) throw wrong("gives an answer that is no JSON");
@@ -64,7 +64,7 @@ class Rest {
     if (!f) throw lost();
     std::uint64_t got = 0;
     const pacs::Reply reply =
-        http_.ask({.path = path, .accept = {}, .most = kMostText, .take = [&](const pacs::Reply&, std::string_view piece) {
+        http_.ask({.path = path, .accept = {}, .most = kMaxAnswerBytes, .take = [&](const pacs::Reply&, std::string_view piece) {
                      if (piece.size() > bytes - got) throw WrongObject("an object is longer than " + url_ + " says");
                      got += piece.size();
                      if (std::fwrite(piece.data(), 1, piece.size(), f.get()) != piece.size()) throw lost();
@@ -115,7 +115,7 @@ void write_state(const fs::path& folder, const State& s) {
              Json{{"osteotome_orthanc", 1}, {"url", s.url}, {"last", s.last}, {"id", s.id}, {"tries", s.tries}}.dump() + "\n");
 }
 
-std::string text_in(const Json& object, const char* key) {
+std::string string_member(const Json& object, const char* key) {
   const Json* const v = object.find(key);
   return v != nullptr && v->text() != nullptr ? *v->text() : std::string();
 }
@@ -136,7 +136,7 @@ class Follower {
   void run() {
     check_log();
     while (true) {
-      const Json page = changes(state_.last, kPage);
+      const Json page = changes(state_.last, kChangesPerPage);
       const Json* const list = page.find("Changes");
       const Json* const done = page.find("Done");
       if (done == nullptr || done->flag() == nullptr) throw http_.wrong("gives no list of changes");
@@ -144,14 +144,14 @@ class Follower {
       for (const Json& change : list->items()) {
         const std::int64_t seq = seq_of(change);
         if (seq <= state_.last) throw http_.wrong("gives changes out of their order");
-        if (text_in(change, "ChangeType") == "StableSeries") {
-          const std::string id = text_in(change, "ID");
+        if (string_member(change, "ChangeType") == "StableSeries") {
+          const std::string id = string_member(change, "ID");
           if (!is_id(id)) throw http_.wrong("names a series that cannot be");
           take(id);
           keep(seq, id);
         } else {
           state_.last = seq;  // kept with the page
-          state_.id = text_in(change, "ID");
+          state_.id = string_member(change, "ID");
         }
       }
       if (!list->items().empty()) keep(state_.last, state_.id);
@@ -185,7 +185,7 @@ class Follower {
     if (state_.last == 0) return;
     const Json page = changes(state_.last - 1, 1);
     const auto& list = page.find("Changes")->items();
-    if (!list.empty() && (seq_of(list[0]) != state_.last || text_in(list[0], "ID") == state_.id)) return;
+    if (!list.empty() && (seq_of(list[0]) != state_.last || string_member(list[0], "ID") == state_.id)) return;
     context_.warn("the list of changes is not the one that was followed before: it is gone through from its beginning");
     keep(0, "");
   }
@@ -206,7 +206,7 @@ class Follower {
     const auto series = http_.ask("/series/" + id);
     if (!series) return;  // deleted since
     const Json* const tags = series->find("MainDicomTags");
-    const std::string modality = tags == nullptr ? "" : text_in(*tags, "Modality");
+    const std::string modality = tags == nullptr ? "" : string_member(*tags, "Modality");
     if (!modality.empty() && modality != "CT" && modality != "MR") return;
     const auto objects = http_.ask("/series/" + id + "/instances");
     if (!objects) return;
@@ -216,7 +216,7 @@ class Follower {
     ::chmod(half.c_str(), 0700);
     std::vector<std::string> fresh;
     for (const Json& object : objects->items()) {
-      const std::string instance = text_in(object, "ID");
+      const std::string instance = string_member(object, "ID");
       const Json* const size = object.find("FileSize");
       const double bytes = size == nullptr ? 0 : size->number().value_or(0);
       if (!is_id(instance) || bytes < 1 || bytes > 1e15) throw WrongObject("an object without a name or length");

@@ -226,7 +226,7 @@ struct Runner {
 
 }  // namespace
 
-std::string run_on_bone(const Operation& operation, const Image& ct, BitMask& bone, const Context& context) {
+std::string run_on_bone(const EditOperation& operation, const Image& ct, BitMask& bone, const Context& context) {
   return std::visit(Runner{ct, bone, context}, operation);
 }
 

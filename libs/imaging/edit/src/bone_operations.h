@@ -10,7 +10,7 @@
 namespace osteo::inline imaging {
 
 /// Changes `bone` as the operation says, which must change bone. Returns what a person has to know beside the volumes, else empty.
-std::string run_on_bone(const Operation& operation, const Image& ct, BitMask& bone, const Context& context);
+std::string run_on_bone(const EditOperation& operation, const Image& ct, BitMask& bone, const Context& context);
 
 /// Rows of voxels whose centres lie within `radius_mm` of the segment from `a` to `b` (LPS mm), each with its range along x.
 void rows_of_capsule(const Frame& frame, Vec3 a, Vec3 b, double radius_mm,

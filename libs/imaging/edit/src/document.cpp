@@ -69,7 +69,7 @@ double EditDocument::volume_mm3(int value) const {
   return static_cast<double>(n) * state_->ct.frame.voxel_volume_mm3();
 }
 
-EditOutcome EditDocument::apply(const Operation& operation, const Context& context) {
+EditOutcome EditDocument::apply(const EditOperation& operation, const Context& context) {
   State& s = *state_;
   if (s.stroke) throw Error(ExitCode::failed, "a stroke is being drawn");
   require_valid(operation);
@@ -90,7 +90,7 @@ EditOutcome EditDocument::apply(const Operation& operation, const Context& conte
   return outcome;
 }
 
-BonePlan EditDocument::plan(std::vector<Operation> operations, const Context& context) const {
+BonePlan EditDocument::plan(std::vector<EditOperation> operations, const Context& context) const {
   BonePlan p{{}, state_->bone, {}, nullptr, state_->version};
   if (operations.empty()) return p;
   for (std::size_t i = 0; i < operations.size(); ++i) {
@@ -119,9 +119,9 @@ EditOutcome EditDocument::commit(BonePlan plan) {
   return plan.outcome;
 }
 
-std::vector<Operation> EditDocument::with_later_steps(const ThresholdEdit& threshold) const {
-  std::vector<Operation> all{threshold};
-  for (const Operation& o : operations()) {
+std::vector<EditOperation> EditDocument::with_later_steps(const ThresholdEdit& threshold) const {
+  std::vector<EditOperation> all{threshold};
+  for (const EditOperation& o : operations()) {
     if (changes_bone(o) && !std::holds_alternative<ThresholdEdit>(o)) all.push_back(o);
   }
   return all;
@@ -256,14 +256,14 @@ std::uint64_t EditDocument::version() const {
   return state_->version;
 }
 
-std::vector<Operation> EditDocument::operations() const {
-  std::vector<Operation> all;
+std::vector<EditOperation> EditDocument::operations() const {
+  std::vector<EditOperation> all;
   for (const Step& s : state_->done) all.insert(all.end(), s.operations.begin(), s.operations.end());
   std::size_t last = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (std::holds_alternative<ThresholdEdit>(all[i])) last = i;
   }
-  std::vector<Operation> live;
+  std::vector<EditOperation> live;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (i >= last || !changes_bone(all[i])) live.push_back(std::move(all[i]));
   }

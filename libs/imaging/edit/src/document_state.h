@@ -64,13 +64,13 @@ class Recorder {
 using Structures = std::vector<EditStructure>;
 
 struct Step {
-  std::vector<Operation> operations;
+  std::vector<EditOperation> operations;
   bool remembered = true;  // false: what it changed was forgotten to save memory
   WordChanges bone, labels;
   std::optional<std::pair<Structures, Structures>> structures;  // before and after
   [[nodiscard]] std::size_t memory_bytes() const {
     std::size_t n = sizeof *this + bone.memory_bytes() + labels.memory_bytes();
-    for (const Operation& o : operations) {
+    for (const EditOperation& o : operations) {
       n += sizeof o;
       if (const auto* const b = std::get_if<BrushEdit>(&o)) n += b->points_mm.capacity() * sizeof(Vec3);
       if (const auto* const v = std::get_if<VoxelsEdit>(&o)) n += v->runs.capacity();
@@ -302,7 +302,7 @@ struct EditDocument::State {
       return {static_cast<std::uint8_t>(rgb[0]), static_cast<std::uint8_t>(rgb[1]), static_cast<std::uint8_t>(rgb[2])};
     }
   };
-  void run_on_structures(const Operation& operation, Recorder& recorder) { std::visit(Runner{*this, recorder}, operation); }
+  void run_on_structures(const EditOperation& operation, Recorder& recorder) { std::visit(Runner{*this, recorder}, operation); }
   void require_free(const std::string& name, int but) const {
     for (const EditStructure& s : structures) {
       if (s.is.name == name && s.is.value != but) throw Error(ExitCode::usage, "there is a structure '" + name + "' already");
@@ -353,7 +353,7 @@ struct EditDocument::State {
 
   void run_again(const Step& step, const Context& context) {
     Recorder nobody;
-    for (const Operation& o : step.operations) {
+    for (const EditOperation& o : step.operations) {
       if (changes_bone(o)) {
         run_on_bone(o, ct, bone, context);
       } else {

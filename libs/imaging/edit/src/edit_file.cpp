@@ -22,24 +22,24 @@ Json value_of(const FieldRef& field) {
 }
 
 // One of each kind, as it is when nothing is said.
-const std::vector<Operation>& all_kinds() {
-  static const std::vector<Operation> kinds{ThresholdEdit{},    IslandEdit{},          IslandSizeEdit{},     BoxEdit{},
+const std::vector<EditOperation>& all_kinds() {
+  static const std::vector<EditOperation> kinds{ThresholdEdit{},    IslandEdit{},          IslandSizeEdit{},     BoxEdit{},
                                             FillEdit{},         SmoothEdit{},          BrushEdit{},          VoxelsEdit{},
                                             AddStructureEdit{}, ChangeStructureEdit{}, DeleteStructureEdit{}};
   return kinds;
 }
 
-Operation read_operation(const JsonFile& file, const JsonValue& j, const std::string& where) {
+EditOperation read_operation(const JsonFile& file, const JsonValue& j, const std::string& where) {
   const JsonValue& does = file.need(j, where, "do");
   const std::string& name = file.text(does, where + ": \"do\"");
-  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(), [&](const Operation& o) { return operation_name(o) == name; });
+  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(), [&](const EditOperation& o) { return operation_name(o) == name; });
   if (kind == all_kinds().end()) {
     std::vector<std::string> known;
-    for (const Operation& o : all_kinds()) known.emplace_back(operation_name(o));
+    for (const EditOperation& o : all_kinds()) known.emplace_back(operation_name(o));
     const std::string near = nearest_name(name, known);
     throw file.wrong(does, where + ": '" + name + "' is nothing that can be done", near.empty() ? "" : "did you mean '" + near + "'?");
   }
-  Operation operation = *kind;
+  EditOperation operation = *kind;
   std::vector<FieldRef> fields = operation_fields(operation);
   for (FieldRef& f : fields) f.doc.needed = true;  // nothing is filled in: what is done again is what was written
   auto* const brush = std::get_if<BrushEdit>(&operation);
@@ -74,7 +74,7 @@ EditRecipe recipe_of(const EditDocument& document) {
 
 Json edits_json(const EditRecipe& recipe) {
   Json operations = Json::list();
-  for (Operation o : recipe.operations) {
+  for (EditOperation o : recipe.operations) {
     Json j{{"do", operation_name(o)}};
     for (const FieldRef& f : operation_fields(o)) j[f.doc.name] = value_of(f);
     if (const auto* const brush = std::get_if<BrushEdit>(&o)) {

@@ -58,11 +58,11 @@ struct Check {
 
 }  // namespace
 
-std::string_view operation_name(const Operation& operation) {
+std::string_view operation_name(const EditOperation& operation) {
   return std::visit([](const auto& o) { return std::decay_t<decltype(o)>::kName; }, operation);
 }
 
-std::string operation_text(const Operation& operation) {
+std::string operation_text(const EditOperation& operation) {
   struct Text {
     std::string operator()(const ThresholdEdit& o) const {
       return "threshold from " + number(o.lower_hu) + (o.upper_hu < 32767 ? " to " + number(o.upper_hu) : std::string()) + " HU";
@@ -87,17 +87,17 @@ std::string operation_text(const Operation& operation) {
   return std::visit(Text{}, operation);
 }
 
-std::vector<FieldRef> operation_fields(Operation& operation) {
+std::vector<FieldRef> operation_fields(EditOperation& operation) {
   return std::visit([](auto& o) { return fields_of<Described<std::decay_t<decltype(o)>>>(o); }, operation);
 }
 
-bool changes_bone(const Operation& operation) {
+bool changes_bone(const EditOperation& operation) {
   if (const auto* const brush = std::get_if<BrushEdit>(&operation)) return brush->structure == 0;
   return operation.index() <= 5;
 }
 
-void require_valid(const Operation& operation) {
-  Operation copy = operation;
+void require_valid(const EditOperation& operation) {
+  EditOperation copy = operation;
   for (const FieldRef& f : operation_fields(copy)) f.from_text(f.to_text(), f.doc.name);  // ranges
   std::visit(Check{}, operation);
 }

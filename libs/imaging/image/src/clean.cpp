@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "osteo/imaging/image/components.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 
 namespace osteo::inline imaging::image {
 namespace {

@@ -14,7 +14,7 @@
 namespace osteo::inline imaging {
 namespace {
 
-constexpr int kLow = -1024, kHigh = 3071;  // what is beyond is metal or padding, and stays
+constexpr int kLowestHu = -1024, kHighestHu = 3071;  // what is beyond is metal or padding, and stays
 constexpr double kStrength = 0.8;          // of OpenCV's filter, for each HU of noise: measured (docs/accuracy.md)
 
 // Writes what `change` makes of each slice, which it gets as a copy in single precision, into a new volume.
@@ -158,16 +158,16 @@ Image denoise(const Image& image, const DenoiseParams& params, const Context& co
   Image out = each_slice(image, context, [&](std::size_t, const cv::Mat& slice, std::int16_t* to) {
     cv::Mat shifted, smooth;
     slice.convertTo(shifted, CV_32F);
-    shifted = cv::min(cv::max(shifted, static_cast<float>(kLow)), static_cast<float>(kHigh)) - kLow;
+    shifted = cv::min(cv::max(shifted, static_cast<float>(kLowestHu)), static_cast<float>(kHighestHu)) - kLowestHu;
     // Sixteen steps a HU: rounding to whole ones would cost as much as is won.
     shifted.convertTo(shifted, CV_16U, 16);
     cv::fastNlMeansDenoising(shifted, smooth, std::vector<float>{16 * strength}, 5, 11, cv::NORM_L1);
     for (int j = 0; j < slice.rows; ++j)
       for (int i = 0; i < slice.cols; ++i) {
         const std::int16_t was = slice.at<std::int16_t>(j, i);
-        if (was < kLow || was > kHigh) continue;
+        if (was < kLowestHu || was > kHighestHu) continue;
         to[static_cast<std::size_t>(j) * static_cast<std::size_t>(slice.cols) + static_cast<std::size_t>(i)] =
-            rounded(static_cast<float>(smooth.at<std::uint16_t>(j, i)) / 16 + kLow);
+            rounded(static_cast<float>(smooth.at<std::uint16_t>(j, i)) / 16 + kLowestHu);
       }
   });
   const Sharpness after = sharpness_of(out, image);
@@ -196,7 +196,7 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
     const int n = std::max(size.width, size.height), left = (n - size.width) / 2, top = (n - size.height) / 2;
     cv::Mat values, small, share, square, square_metal;
     slice.convertTo(values, CV_32F);
-    values = cv::max(values, static_cast<float>(kLow)) + 1000;
+    values = cv::max(values, static_cast<float>(kLowestHu)) + 1000;
     cv::resize(values, small, size, 0, 0, cv::INTER_AREA);
     metal.convertTo(share, CV_32F, 1.0 / 255);
     cv::resize(share, share, size, 0, 0, cv::INTER_AREA);
@@ -217,7 +217,7 @@ Image reduce_metal(const Image& image, const MetalParams& params, const Context&
       for (int i = 0; i < slice.cols; ++i) {
         if (near.at<std::uint8_t>(j, i) != 0) continue;
         const std::int16_t was = slice.at<std::int16_t>(j, i), now = rounded(std::max(static_cast<float>(was) + full.at<float>(j, i),
-                                                                                      static_cast<float>(std::min<int>(was, kLow))));
+                                                                                      static_cast<float>(std::min<int>(was, kLowestHu))));
         to[static_cast<std::size_t>(j) * static_cast<std::size_t>(slice.cols) + static_cast<std::size_t>(i)] = now;
         changed[k] += now != was;
         by[k] += std::abs(now - was);

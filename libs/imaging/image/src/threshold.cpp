@@ -6,7 +6,7 @@
 #include "clean.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/parallel.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 
 namespace osteo::inline imaging {
 namespace {

@@ -10,10 +10,10 @@
 namespace osteo::inline imaging::registration {
 namespace {
 
-constexpr double kReachMm = 4, kStepMm = 0.25, kHalfMm = 4;
-constexpr int kReach = static_cast<int>(kReachMm / kStepMm), kHalf = static_cast<int>(kHalfMm / kStepMm);
+constexpr double kEdgeReachMm = 4, kStepMm = 0.25, kHalfMm = 4;
+constexpr int kReach = static_cast<int>(kEdgeReachMm / kStepMm), kHalf = static_cast<int>(kHalfMm / kStepMm);
 constexpr double kAlike = 0.6;  // correlation of two profiles of slopes that are of one edge
-constexpr std::size_t kMostPoints = 6000;
+constexpr std::size_t kMaxEdgePoints = 6000;
 
 struct Edge {
   Vec3 at_mm, normal;  // towards the brighter side
@@ -140,7 +140,7 @@ std::vector<Measured> measure(const std::vector<Edge>& all, const Levels& first,
     for (std::size_t a = 0; a < 3; ++a) in = in && x[a] >= 2 && x[a] <= second.levels.front().frame.dims[a] - 3;
     if (in) edges.push_back(e);
   }
-  const std::size_t step = std::max<std::size_t>(1, edges.size() / kMostPoints), n = edges.size() / step;
+  const std::size_t step = std::max<std::size_t>(1, edges.size() / kMaxEdgePoints), n = edges.size() / step;
   std::vector<std::optional<Offset>> offsets(n);
   parallel_for(n, 128, context.threads, [&](std::size_t begin, std::size_t end) {
     context.check_cancelled();
@@ -183,7 +183,7 @@ EdgeResidual edge_residual(const Levels& first, const Levels& second, const Rigi
   std::vector<double> size, signed_mm;
   EdgeResidual r;
   for (const Measured& m : measure(edges_of(first, context), first, second, second_from_first, context)) {
-    size.push_back(m.offset.found ? std::abs(m.offset.mm) : kReachMm);
+    size.push_back(m.offset.found ? std::abs(m.offset.mm) : kEdgeReachMm);
     if (m.offset.found) signed_mm.push_back(m.offset.mm);
   }
   r.points = static_cast<int>(size.size());

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 
 namespace osteo::inline imaging::registration {
 

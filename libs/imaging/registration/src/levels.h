@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "osteo/core/base/context.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/core/data/volume.h"
 
 namespace osteo::inline imaging::registration {

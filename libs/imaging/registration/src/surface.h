@@ -1,7 +1,7 @@
 // Bone's surface onto bone's surface.
 #pragma once
 #include "osteo/core/base/context.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/core/data/tri_mesh.h"
 #include "osteo/core/data/volume.h"
 

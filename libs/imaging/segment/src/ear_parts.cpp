@@ -8,7 +8,7 @@
 
 #include "osteo/core/base/parallel.h"
 #include "osteo/imaging/image/components.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 
 namespace osteo::inline imaging::segment {
 

@@ -17,7 +17,7 @@ namespace osteo::inline imaging::segment {
 namespace {
 
 constexpr double kLeastRadiusMm = 2.5, kMostRadiusMm = 7.5;
-constexpr double kStepMm = 0.5;
+constexpr double kMarchStepMm = 0.5;
 constexpr int kRays = 48;
 constexpr double kHeld = 0.5;  // share of the round
 constexpr double kBridged = 0.3, kBridgeMm = 6;
@@ -242,12 +242,12 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
   std::vector<Vec3> line = line_to(up), lower = line_to(down);
   std::reverse(line.begin(), line.end());
   line.insert(line.end(), lower.begin() + 1, lower.end());
-  line = evenly(line, kStepMm);
+  line = evenly(line, kMarchStepMm);
   if (line.size() < 16) {
     part.why = "the groove behind the ear canal is too short for a sinus";
     return part;
   }
-  line = evenly(smoothed_line(line, std::vector<double>(line.size(), 1.0), kStepMm, 1.5), kStepMm);
+  line = evenly(smoothed_line(line, std::vector<double>(line.size(), 1.0), kMarchStepMm, 1.5), kMarchStepMm);
   std::vector<Round> rounds;
   std::vector<double> radius(line.size(), 0.0);
   for (int round = 0; round <= 4; ++round) {
@@ -283,8 +283,8 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
       moved[i] = rounds[i].centre;
       weight[i] = rounds[i].held >= 0.4 ? rounds[i].held : 0.02;
     }
-    const std::vector<Vec3> smooth = smoothed_line(moved, weight, kStepMm, 1.5);
-    const std::vector<Vec3> next = evenly(smooth, kStepMm);
+    const std::vector<Vec3> smooth = smoothed_line(moved, weight, kMarchStepMm, 1.5);
+    const std::vector<Vec3> next = evenly(smooth, kMarchStepMm);
     // Sizes go along to where the stations are now.
     radius.assign(next.size(), 0.0);
     for (std::size_t i = 0; i < next.size(); ++i) {
@@ -311,7 +311,7 @@ Part find_sinus(const Field& f, const Levels& levels, const Canal& canal, const 
       const auto at = static_cast<std::size_t>(i);
       if (rounds[at].held < kBridged && !held(at)) break;
       if (held(at)) end = at;
-      if (std::abs(static_cast<double>(i) - static_cast<double>(end)) * kStepMm > kBridgeMm) break;
+      if (std::abs(static_cast<double>(i) - static_cast<double>(end)) * kMarchStepMm > kBridgeMm) break;
     }
     return end;
   };

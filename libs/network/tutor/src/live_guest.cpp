@@ -6,7 +6,7 @@
 namespace osteo::inline network {
 namespace {
 
-constexpr std::int64_t kSendEveryUs = 2000, kAskEveryUs = 100'000, kLostUs = 2'000'000;
+constexpr std::int64_t kGuestSendEveryUs = 2000, kAskEveryUs = 100'000, kLostUs = 2'000'000;
 
 }  // namespace
 
@@ -163,7 +163,7 @@ std::vector<Bytes> LiveGuest::poll(std::int64_t now_us) {
       out.push_back(std::move(ask.bytes));
     }
   }
-  if (state_ == JoinState::joined && now_us - last_sent_us_ >= kSendEveryUs) {
+  if (state_ == JoinState::joined && now_us - last_sent_us_ >= kGuestSendEveryUs) {
     last_sent_us_ = now_us;
     HandPacket p;
     p.times = clock_.stamp(now_us);

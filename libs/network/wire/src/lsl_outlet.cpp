@@ -15,7 +15,7 @@ namespace {
 struct LslInfo;
 struct LslOutletHandle;
 struct LslXml;
-constexpr std::int32_t kInt16 = 5, kText = 3;
+constexpr std::int32_t kLslInt16 = 5, kLslText = 3;
 
 class Library {
  public:
@@ -70,12 +70,12 @@ class LslOutlet final : public WireOutlet {
  public:
   void begin(const WireMonitor& monitor) override {
     channels_ = monitor.labels.size();
-    LslInfo* const events = lsl_.create_info("OsteotomeEvents", "Markers", 1, 0, kText, "osteotome-events");
+    LslInfo* const events = lsl_.create_info("OsteotomeEvents", "Markers", 1, 0, kLslText, "osteotome-events");
     events_ = lsl_.create_outlet(events, 0, kBufferedS);
     lsl_.destroy_info(events);
     if (channels_ == 0) return;
     LslInfo* const info =
-        lsl_.create_info("OsteotomeEMG", "EMG", static_cast<std::int32_t>(channels_), MonitorSetup::kRateHz, kInt16, "osteotome-emg");
+        lsl_.create_info("OsteotomeEMG", "EMG", static_cast<std::int32_t>(channels_), MonitorSetup::kRateHz, kLslInt16, "osteotome-emg");
     LslXml* const all = lsl_.child(lsl_.desc(info), "channels");
     for (const std::string& label : monitor.labels) {
       LslXml* const one = lsl_.child(all, "channel");

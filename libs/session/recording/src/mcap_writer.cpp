@@ -21,7 +21,7 @@ enum Op : unsigned char {
   kSummaryOffset = 0x0e,
   kDataEnd = 0x0f,
 };
-constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
+constexpr std::string_view kMcapMagic{"\x89MCAP0\r\n", 8};
 constexpr std::size_t kChunkBytes = 768 << 10;
 
 template <class T>
@@ -51,7 +51,7 @@ std::uint32_t crc32_of(std::uint32_t crc, std::string_view bytes) {
 }  // namespace
 
 McapWriter::McapWriter(Out out, std::string_view library) : out_(std::move(out)) {
-  std::string bytes(kMagic), content;
+  std::string bytes(kMcapMagic), content;
   text(content, "");  // no profile
   text(content, library);
   record(bytes, kHeader, content);
@@ -227,7 +227,7 @@ void McapWriter::finish() {
   record(all, kFooter, content);
   all.resize(all.size() - sizeof(std::uint32_t));
   number(all, crc32_of(0, all));
-  all.append(kMagic);
+  all.append(kMcapMagic);
   put(all);
 }
 

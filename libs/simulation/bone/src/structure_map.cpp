@@ -11,7 +11,7 @@
 #include "osteo/simulation/bone/burr.h"
 #include "osteo/geometry/distance/distance_map.h"
 #include "osteo/geometry/grid/brick_linear.h"
-#include "osteo/imaging/image/distance.h"
+#include "osteo/geometry/distance/binary_distance.h"
 #include "osteo/geometry/mesh/bone_surface.h"
 
 namespace osteo::inline simulation {

@@ -9,12 +9,12 @@ namespace osteo::inline simulation {
 namespace {
 
 // Also of the square of its length, so that nothing overflows on the way.
-Vec3 finite(Vec3 v) {
+Vec3 finite_or_zero(Vec3 v) {
   return std::isfinite(dot(v, v)) ? v : Vec3{};
 }
 Vec3 direction(Vec3 v) {
   const double n2 = dot(v, v);
-  return std::abs(n2 - 1) < 1e-6 ? v : normalized(finite(v));
+  return std::abs(n2 - 1) < 1e-6 ? v : normalized(finite_or_zero(v));
 }
 // A limit that is not a number is the strictest.
 double limit_of(double value) {
@@ -67,7 +67,7 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
   // From one tick to the next, in encoder steps or not: the steps average out, while any smoothing would come late, and damping by a
   // late velocity drives what it should damp.
   const Vec3 at = placed ? in.position_mm : last_x_mm_;
-  velocity_ = moving_ ? finite((at - last_x_mm_) / dt) : Vec3{};
+  velocity_ = moving_ ? finite_or_zero((at - last_x_mm_) / dt) : Vec3{};
   last_x_mm_ = at;
   moving_ = true;
   double share = resume_;
@@ -80,7 +80,7 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
     resume_ = params_.resume_s > 0 ? std::min(1.0, resume_ + dt / params_.resume_s) : 1.0;
     share = resume_;
   }
-  const Vec3 elastic = finite(in.elastic_n) * share;
+  const Vec3 elastic = finite_or_zero(in.elastic_n) * share;
   Vec3 force = elastic;
   if (!(elastic == Vec3{})) {
     // Damping may slow the hand's way out, but never hold it.
@@ -95,8 +95,8 @@ Guard::Output Guard::limit(const Input& in, double dt_s) noexcept {
       out.flags |= kPassivity;
     }
   }
-  const Vec3 effects = finite(in.effects_n) * share;
-  force = finite(force + effects);
+  const Vec3 effects = finite_or_zero(in.effects_n) * share;
+  force = finite_or_zero(force + effects);
   if (const double n = length(force); n > most_n_) {
     force = force * (most_n_ / n);
     out.flags |= kForceCapped;

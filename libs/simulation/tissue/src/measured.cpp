@@ -52,7 +52,7 @@ MeasuredCalibration calibrate_measured(TissueModel&, const BodySurface&, std::sp
 
 namespace {
 
-using Matrix = Eigen::MatrixXd;
+using DenseMatrix = Eigen::MatrixXd;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Clock = std::chrono::steady_clock;
 
@@ -350,11 +350,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   const auto w = static_cast<Eigen::Index>(width);
   const Eigen::Map<const RowMajor> j(jacobian.data(), static_cast<Eigen::Index>(residuals.size()), w);
   const Eigen::Index data_rows = fit.goal_rows();
-  Matrix data = Matrix::Zero(w, w), spread = data;
+  DenseMatrix data = DenseMatrix::Zero(w, w), spread = data;
   Eigen::Index row = 0;
   for (const MeasuredView& view : result.views) {
     const Eigen::Index n = static_cast<Eigen::Index>(view.drawn) * (view.markers ? 3 : 1);
-    const Matrix own = j.middleRows(row, n).transpose() * j.middleRows(row, n);
+    const DenseMatrix own = j.middleRows(row, n).transpose() * j.middleRows(row, n);
     const double left = Eigen::Map<const Eigen::VectorXd>(residuals.data() + row, n).squaredNorm() / static_cast<double>(n);
     // Values on a plane that go with their neighbours count as fewer, by the sum of what each goes with.
     const double wide = view.correlation > 0 ? (1 + view.correlation) / (1 - view.correlation) : 1;
@@ -362,7 +362,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     spread += own * (left * wide * wide);
     row += n;
   }
-  const Matrix prior = j.bottomRows(j.rows() - data_rows).transpose() * j.bottomRows(j.rows() - data_rows);
+  const DenseMatrix prior = j.bottomRows(j.rows() - data_rows).transpose() * j.bottomRows(j.rows() - data_rows);
   const auto& grid = options.calibrate.grid;
   const std::size_t nodes = fit.nodes();
   const bool map = nodes > 1, shared = options.calibrate.shared_grid;
@@ -386,7 +386,7 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
   const auto class_of = [&](int i) {
     return fit.of_map(i) ? kTissueClasses : shared ? fit.number_of(i) - nodes : fit.number_of(i) % kTissueClasses;
   };
-  Matrix before = Matrix::Zero(w, w);
+  DenseMatrix before = DenseMatrix::Zero(w, w);
   for (int a = 0; a < fit.width(); ++a) {
     if (a >= fit.parameters()) {
       before(a, a) = 1;
@@ -405,11 +405,11 @@ MeasuredCalibration calibrate_measured(TissueModel& model, const BodySurface& su
     }
   }
   // A class without a constraint (or faces that carry nothing) must not make it singular.
-  Matrix all = data + prior;
+  DenseMatrix all = data + prior;
   all.diagonal().array() += 1e-14 * all.trace();
-  const Eigen::LDLT<Matrix> solved(all);
-  const Matrix inner = spread + prior * before * prior;
-  const Matrix covariance = solved.solve(solved.solve(inner).transpose());
+  const Eigen::LDLT<DenseMatrix> solved(all);
+  const DenseMatrix inner = spread + prior * before * prior;
+  const DenseMatrix covariance = solved.solve(solved.solve(inner).transpose());
   const Eigen::VectorXd logs = Eigen::Map<const Eigen::VectorXd>(at.data(), w);
   const auto mean_of = [&](const auto& wanted) {
     Eigen::VectorXd share = Eigen::VectorXd::Zero(w);

@@ -14,16 +14,9 @@
 namespace osteo::inline app::cli {
 
 enum class ProgressStyle : int { automatic, bar, json, slicer, none };
-
-}  // namespace osteo::app::cli
-
-namespace osteo::inline app {
-[[nodiscard]] constexpr std::array<std::string_view, 5> enum_names(cli::ProgressStyle) {
+[[nodiscard]] constexpr std::array<std::string_view, 5> enum_names(ProgressStyle) {
   return {"auto", "bar", "json", "slicer", "none"};
 }
-}  // namespace osteo::app
-
-namespace osteo::inline app::cli {
 
 /// Flags that every command has.
 struct Common {

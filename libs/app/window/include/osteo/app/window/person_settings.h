@@ -8,10 +8,12 @@
 #include "osteo/core/base/param.h"
 #include "osteo/app/window/hand_buttons.h"
 
-namespace osteo::inline app {
-
+namespace osteo {
 class JsonFile;
 struct JsonValue;
+}
+
+namespace osteo::inline app {
 
 struct PersonValues {
   using Params = PersonValues;

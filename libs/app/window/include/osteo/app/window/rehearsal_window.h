@@ -22,9 +22,11 @@
 #include "osteo/app/window/tutor_now.h"
 #include "osteo/app/window/window_shell.h"
 
-namespace osteo::inline app {
-
+namespace osteo::inline simulation {
 struct HandTuning;
+}
+
+namespace osteo::inline app {
 
 struct WindowOptions {
   Quality quality = Quality::automatic;

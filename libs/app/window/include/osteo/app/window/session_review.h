@@ -11,9 +11,11 @@
 #include "osteo/core/data/vec.h"
 #include "osteo/session/scene/session_player.h"
 
-namespace osteo::inline app {
-
+namespace osteo::inline simulation {
 class StructureMap;
+}
+
+namespace osteo::inline app {
 
 /// A sentence, and what it comes from.
 struct ReviewFinding {

@@ -16,19 +16,12 @@ inline constexpr std::size_t kTrainings = 3;
 [[nodiscard]] const char* short_name(Training training);
 /// When sight of the own force comes: while it is pressed, or of the whole run behind it.
 enum class Feedback : int { concurrent, delayed };
-
-}  // namespace osteo::assessment::experiment
-
-template <>
-struct osteo::EnumNames<osteo::experiment::Training> {
-  static constexpr std::array<std::string_view, 3> values{"haptic", "visual", "visuohaptic"};
-};
-template <>
-struct osteo::EnumNames<osteo::experiment::Feedback> {
-  static constexpr std::array<std::string_view, 2> values{"concurrent", "delayed"};
-};
-
-namespace osteo::inline assessment::experiment {
+[[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(Training) {
+  return {"haptic", "visual", "visuohaptic"};
+}
+[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(Feedback) {
+  return {"concurrent", "delayed"};
+}
 
 struct Protocol {
   using Params = Protocol;

@@ -60,9 +60,8 @@ inline constexpr double kLeadS = 1;
 std::size_t simulate_participant(const std::filesystem::path& experiment, const Protocol& protocol, std::size_t participant, bool retention,
                                  const ParticipantModel& model, const Context& context, const std::function<void()>& after_each = {});
 
-}  // namespace osteo::assessment::experiment
+[[nodiscard]] constexpr std::array<std::string_view, 4> enum_names(Mover) {
+  return {"simulated", "mouse", "keys", "device"};
+}
 
-template <>
-struct osteo::EnumNames<osteo::experiment::Mover> {
-  static constexpr std::array<std::string_view, 4> values{"simulated", "mouse", "keys", "device"};
-};
+}  // namespace osteo::assessment::experiment

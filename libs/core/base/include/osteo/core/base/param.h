@@ -22,9 +22,12 @@ struct FieldDoc {
   bool needed = false;  ///< in files: there is no default
 };
 
-/// Specialise for each enum used as a parameter: `static constexpr std::array<std::string_view, N> values`, in enum order.
+/// The names of an enum that parameters use, in enum order. Beside each such enum, in its namespace, stands
+/// `constexpr std::array<std::string_view, N> enum_names(E)`.
 template <class E>
-struct EnumNames;
+struct EnumNames {
+  static constexpr auto values = enum_names(E{});
+};
 
 /// A reference to one field of a Params struct, its type erased to the few kinds that parameters may have.
 /// Borrowed: valid as long as the struct it points into.

@@ -2,7 +2,7 @@
 #pragma once
 #include <vtkSmartPointer.h>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/round_cone.h"
 #include "osteo/core/data/tri_mesh.h"
 #include "osteo/core/data/vec.h"

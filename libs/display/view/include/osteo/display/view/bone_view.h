@@ -10,7 +10,7 @@
 #include <vtkSmartPointer.h>
 
 #include "osteo/simulation/bone/live_surface.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/display/view/bone_paint.h"
 #include "osteo/display/view/wet_film.h"
 

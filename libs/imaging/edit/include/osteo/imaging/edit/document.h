@@ -73,13 +73,13 @@ class EditDocument {
 
   /// One step of one operation. Errors: usage for values out of range or a structure that is not there; cancelled, and then nothing is
   /// done.
-  EditOutcome apply(const Operation& operation, const Context& context = {});
+  EditOutcome apply(const EditOperation& operation, const Context& context = {});
   /// One step of several operations on bone, worked out beside the document, which others may read meanwhile. Made true by `commit`, which
   /// takes no time, unless the document was changed since (Error(failed)).
-  [[nodiscard]] BonePlan plan(std::vector<Operation> operations, const Context& context = {}) const;
+  [[nodiscard]] BonePlan plan(std::vector<EditOperation> operations, const Context& context = {}) const;
   EditOutcome commit(BonePlan plan);
   /// A threshold, and after it all that was done to bone since the last one, or since the beginning: what a new threshold would forget.
-  [[nodiscard]] std::vector<Operation> with_later_steps(const ThresholdEdit& threshold) const;
+  [[nodiscard]] std::vector<EditOperation> with_later_steps(const ThresholdEdit& threshold) const;
 
   // A brush stroke while it is drawn: it shows at once, and is one step when it ends. Nothing else may be done meanwhile.
   /// `stroke` without points.
@@ -102,7 +102,7 @@ class EditDocument {
   [[nodiscard]] std::uint64_t version() const;
 
   /// What leads from the start to here, without what a later threshold has made vain.
-  [[nodiscard]] std::vector<Operation> operations() const;
+  [[nodiscard]] std::vector<EditOperation> operations() const;
   /// Content hash of bone, labels and structures (not whether they are shown).
   [[nodiscard]] std::string hash() const;
   /// Of the CT, as `hash_of` has it.
@@ -120,7 +120,7 @@ class EditDocument {
 };
 
 struct BonePlan {
-  std::vector<Operation> operations;
+  std::vector<EditOperation> operations;
   BitMask bone;
   EditOutcome outcome;
   std::shared_ptr<const WordChanges> changes;

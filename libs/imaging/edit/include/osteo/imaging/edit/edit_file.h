@@ -14,7 +14,7 @@ struct EditRecipe {
   std::string ct_hash;      ///< of the CT that was edited, with its grid (`hash_of`)
   std::string start_hash;   ///< of mask and structures at the beginning
   std::string result_hash;  ///< of mask and structures at the end
-  std::vector<Operation> operations;
+  std::vector<EditOperation> operations;
   std::vector<int> hidden;  ///< values of structures that were not shown
 };
 

@@ -140,18 +140,18 @@ struct DeleteStructureEdit {
   static void describe(DeleteStructureEdit& p, auto& visit) { visit({"structure", "its value", "", 1, 255}, p.structure); }
 };
 
-using Operation = std::variant<ThresholdEdit, IslandEdit, IslandSizeEdit, BoxEdit, FillEdit, SmoothEdit, BrushEdit, VoxelsEdit,
+using EditOperation = std::variant<ThresholdEdit, IslandEdit, IslandSizeEdit, BoxEdit, FillEdit, SmoothEdit, BrushEdit, VoxelsEdit,
                                AddStructureEdit, ChangeStructureEdit, DeleteStructureEdit>;
 
 /// As files call it: "threshold".
-[[nodiscard]] std::string_view operation_name(const Operation& operation);
+[[nodiscard]] std::string_view operation_name(const EditOperation& operation);
 /// For people: "threshold from 300 HU", "eraser 4 mm".
-[[nodiscard]] std::string operation_text(const Operation& operation);
+[[nodiscard]] std::string operation_text(const EditOperation& operation);
 /// References into the operation; what is no field (the points of a brush) is not among them.
-[[nodiscard]] std::vector<FieldRef> operation_fields(Operation& operation);
+[[nodiscard]] std::vector<FieldRef> operation_fields(EditOperation& operation);
 /// Whether it changes bone; the others change structures only.
-[[nodiscard]] bool changes_bone(const Operation& operation);
+[[nodiscard]] bool changes_bone(const EditOperation& operation);
 /// Error(usage) for values out of range: no points, corners in the wrong order, no name, no colour.
-void require_valid(const Operation& operation);
+void require_valid(const EditOperation& operation);
 
 }  // namespace osteo::imaging

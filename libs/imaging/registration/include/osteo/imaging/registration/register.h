@@ -6,7 +6,7 @@
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/base/param.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/core/data/data.h"
 
 namespace osteo::inline imaging {

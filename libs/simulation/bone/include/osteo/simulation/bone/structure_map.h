@@ -14,9 +14,11 @@
 #include "osteo/geometry/grid/brick_grid.h"
 #include "osteo/geometry/mesh/soup.h"
 
-namespace osteo::inline simulation {
-
+namespace osteo::inline geometry {
 class TriangleTree;
+}
+
+namespace osteo::inline simulation {
 
 /// Signed distances to the face of each structure of a label map, structure by structure: at any depth inside, and outside as far as
 /// `reach_mm` beyond the surface of any burr of the library.

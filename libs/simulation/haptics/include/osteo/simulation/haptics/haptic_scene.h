@@ -7,7 +7,7 @@
 
 #include "osteo/simulation/bone/depth_map.h"
 #include "osteo/simulation/bone/plates.h"
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/marker/body.h"
 
 namespace osteo::inline simulation {

@@ -3,7 +3,7 @@
 #include <array>
 #include <memory>
 
-#include "osteo/simulation/bone/rigid_transform.h"
+#include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/marker/body.h"
 #include "osteo/simulation/marker/camera.h"
 

@@ -1,0 +1,22 @@
+// osteo edit
+#pragma once
+#include <string>
+
+#include "osteo/app/cli/command.h"
+#include "edit_flags.h"
+
+namespace osteo {
+
+struct EditCommand {
+  struct Params : EditFlags {
+    std::string apply;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"apply", "without a window: make the corrections of this file (edits.json) again on the case"}, p.apply);
+    EditFlags::describe(p, visit);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+}  // namespace osteo

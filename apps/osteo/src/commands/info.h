@@ -1,0 +1,16 @@
+// osteo info
+#pragma once
+#include <string>
+
+#include "osteo/app/cli/command.h"
+
+namespace osteo {
+
+struct InfoCommand {
+  struct Params {};
+  static void describe(Params&, auto&) {}
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+}  // namespace osteo

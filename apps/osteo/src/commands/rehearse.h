@@ -1,0 +1,35 @@
+// osteo rehearse
+#pragma once
+#include <string>
+
+#include "osteo/app/cli/command.h"
+#include "osteo/imaging/segment/ear.h"
+#include "window_flags.h"
+
+namespace osteo {
+
+struct RehearseCommand {
+  struct Params : WindowFlags {
+    bool headless = false;
+    std::string script;
+    bool show_settings = false;
+    Side side = Side::left;
+    double seconds = 60;
+    bool fast = false;
+    bool pieces = false;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"headless", "without a window: a scripted hand in front of the same servo"}, p.headless);
+    visit({"script", "headless: strokes as JSON (empty: a cavity on one side of any head)"}, p.script);
+    WindowFlags::describe(p, visit);
+    visit({"show_settings", "print the settings that would be used, as a file to start from, and stop"}, p.show_settings);
+    visit({"side", "headless: of the patient, for the built-in strokes"}, p.side);
+    visit({"seconds", "headless: length of the built-in strokes", "s", 1, 3600}, p.seconds);
+    visit({"fast", "headless: as fast as possible instead of by the clock; the result is the same"}, p.fast);
+    visit({"pieces", "watch whether the bone still hangs together; the summary lists the pieces (the window always does)"}, p.pieces);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+}  // namespace osteo

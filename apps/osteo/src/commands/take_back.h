@@ -1,0 +1,24 @@
+// osteo take-back
+#pragma once
+#include <string>
+
+#include "osteo/app/cli/command.h"
+
+namespace osteo {
+
+struct TakeBackCommand {
+  struct Params {
+    std::string source;
+    bool by_place = false;
+    bool check = false;
+  };
+  static void describe(Params& p, auto& visit) {
+    visit({"source", "the scan of the case, where it is not known on this machine"}, p.source);
+    visit({"by_place", "take segments that bear no mark of the scan, when most of the bone lies where it was"}, p.by_place);
+    visit({"check", "say what changed, and leave the case as it is"}, p.check);
+  }
+  static cli::CommandInfo info();
+  static int run(const Params& params, cli::Invocation& invocation);
+};
+
+}  // namespace osteo
