@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The public headers as pages, by Doxygen, without network, and checked. apps/packaging/api.py OUT
 
-Grouped by component and library as libs/components.txt and docs/library.md have them. Every class, struct and enum of a public header must have a page,
+Grouped by component and library as libs/layers.txt and docs/library.md have them. Every class, struct and enum of a public header must have a page,
 every example be shown, links inside lead somewhere and nothing be fetched from elsewhere: else it fails. OUT/osteo.tag is for the Doxygen of others."""
 import os, pathlib, re, shutil, subprocess, sys, tempfile
 import xml.etree.ElementTree
@@ -33,20 +33,25 @@ def plain(text):
 def groups():
     """Components with what they hold, as Doxygen's groups."""
     holds = {r[0]: plain(r[2]) for r in rows("docs/architecture.md", "library")}
-    libraries = [l.split()[0] for l in (root / "libs/layers.txt").read_text().splitlines() if l.strip() and l[0] != "#"]
-    of = {}
-    for line in (root / "libs/components.txt").read_text().splitlines():
-        if line.strip() and line[0] != "#":
-            name, held = line.split("|")
-            of[name.strip()] = held.split()
+    libraries, of = [], {}
+    for line in (root / "libs/layers.txt").read_text().splitlines():
+        if line.startswith("== "):
+            area = line.split()[1]
+            of[area] = []
+        elif line and line[0] != "#":
+            libraries.append(line.split()[0])
+            of[area].append(libraries[-1])
     components = []  # name, what its example shows, its file, libraries
     for name, _, example in rows("docs/library.md", "component"):
         name = name.strip("`")
         file, shows = re.sub(r"^\[([^\]]*)\]\([^)]*\)", r"\1", example).split(": ", 1)
         components.append((name, shows, file, of.get(name, [name])))
+    own = {held[0] for name, *_, held in components if name not in of}  # a library that is a component stands there alone
+    components = [(n, s, f, [l for l in held if n not in of or l not in own]) for n, s, f, held in components]
     placed = {l for *_, held in components for l in held}
     components.append(("others", "", "", [l for l in libraries if l not in placed]))
 
+    area_of = {l: a for a, held in of.items() for l in held}
     text = ["// Made by apps/packaging/api.py.", "/// @namespace osteo\n/// Everything; what stands in it is grouped by component and library."]
     for name, shows, file, held in components:
         if name == "others":
@@ -57,10 +62,10 @@ def groups():
             text.append(f"/// @defgroup component_{name} Component {name}\n/// Component `{name}`, target `osteo::{name}`. "
                         f"An example, which the test `install` compiles and runs: {shows}.\n/// @include {file}")
         text += [f"/// @defgroup lib_{lib} {lib}\n/// @ingroup component_{name}\n/// Holds: {holds.get(lib, '')}.\n///\n"
-                 f"/// Target `osteo::{lib}`, headers `osteo/{lib}/`." for lib in held]
+                 f"/// Target `osteo::{lib}`, headers `osteo/{area_of[lib]}/{lib}/`." for lib in held]
     main = ["@mainpage The libraries of Osteotome", "",
             "C++20; lengths are millimetres, coordinates LPS, and names carry units. How a program comes by the libraries is in docs/library.md:",
-            "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS import haptics)", "target_link_libraries(mine PRIVATE osteo::import osteo::haptics)",
+            "@code{.cmake}", "find_package(osteo REQUIRED COMPONENTS imaging haptics)", "target_link_libraries(mine PRIVATE osteo::imaging osteo::haptics)",
             "@endcode", "", "| component | libraries |", "|---|---|"]
     for name, _, _, held in components:
         shown = "by their own names" if name == "others" else name
@@ -73,15 +78,15 @@ def groups():
 
 def stage(into):
     """The headers, each in the group of its library: its first comment is what the file holds, what is in the namespace is in the group."""
-    for header in sorted(root.glob("libs/*/include/**/*.h")):
-        lib = header.relative_to(root / "libs").parts[0]
-        to = into / header.relative_to(root / "libs" / lib / "include")
+    for header in sorted(root.glob("libs/*/*/include/**/*.h")):
+        area, lib = header.relative_to(root / "libs").parts[:2]
+        to = into / header.relative_to(root / "libs" / area / lib / "include")
         lines = header.read_text().splitlines()
         top = next((i for i, l in enumerate(lines) if not l.startswith("// ")), 0)
         if top:
             lines[:top] = [("/// @file\n" if i == 0 else "") + "/" + l for i, l in enumerate(lines[:top])]
         for i, line in enumerate(lines):
-            if re.match(r"namespace osteo(::\w+)* \{$", line):
+            if re.match(r"namespace osteo(::inline \w+)?(::\w+)* \{$", line):
                 lines[i] = line + f"\n/** @addtogroup lib_{lib}\n * @{{ */"
             elif re.match(r"\}  // namespace osteo(::\w+)*$", line):
                 lines[i] = "/** @} */\n" + line
@@ -107,7 +112,7 @@ def check(site, components):
     known |= {m.findtext("name") for m in tags.iter("member") if m.get("kind") == "enumeration"}
     grouped = {c.findtext("name"): c for c in tags.iter("compound") if c.get("kind") == "group"}
     declared = 0
-    for header in root.glob("libs/*/include/**/*.h"):
+    for header in root.glob("libs/*/*/include/**/*.h"):
         for name in re.findall(r"^(?:class|struct|enum class|enum)\s+(\w+)[^;<]*?\{", header.read_text(), re.M):
             declared += 1
             if name not in known:

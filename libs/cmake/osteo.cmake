@@ -112,7 +112,8 @@ function(osteo_library name)
   add_library(osteo::${name} ALIAS osteo_${name})
   # Shared ones carry MAJOR.MINOR: while MAJOR is 0, a MINOR may break. No macro for exports: what is ours is exported by its name, when it is linked
   # (exports.map), so both kinds are made of the same objects; each must name all that it takes.
-  set_target_properties(osteo_${name} PROPERTIES VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+  set_target_properties(osteo_${name} PROPERTIES ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/libs LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/libs
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
     DEFINE_SYMBOL "" INSTALL_RPATH "$ORIGIN")
   if(OSTEO_LIBRARY_KIND STREQUAL SHARED AND NOT OSTEO_SANITIZE AND NOT OSTEO_FUZZ)
     target_link_options(osteo_${name} PRIVATE LINKER:--no-undefined)

@@ -19,15 +19,26 @@ end_progress() {
   shown_tenth=-1
 }
 
-# Reads what ninja prints, keeps it in LOG and shows how far it is. show_build TITLE LOG
+# What the compiler made once is taken from its cache again (ccache), in this clone and in another one beside it. Sloppiness: as precompiled headers need.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$root} CCACHE_NOHASHDIR=1 CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
+
+# minutes SECONDS: "about 3 minutes", for people.
+minutes() {
+  local n=$((($1 + 30) / 60))
+  if [ "$n" -gt 1 ]; then printf 'about %s minutes' "$n"; elif [ "$1" -gt 20 ]; then printf 'about a minute'; else printf 'seconds'; fi
+}
+
+# Reads what ninja prints, keeps it in LOG and shows how far it is and, by the steps done so far, how long it still takes. show_build TITLE LOG
 show_build() {
-  local line begun=
+  local line begun= from=$SECONDS left
   while IFS= read -r line || [ -n "$line" ]; do
     printf '%s\n' "$line" >>"$2"
     [[ $line =~ ^\[([0-9]+)/([0-9]+)\]\ (.*) ]] || continue
     [ "${BASH_REMATCH[2]}" -gt 2 ] || continue # looking whether there is anything to do is not building
     [ -n "$begun" ] || { begun=1; say "$1: ${BASH_REMATCH[2]} steps"; }
-    show_progress "$1" $((BASH_REMATCH[1] * 100 / BASH_REMATCH[2])) "[${BASH_REMATCH[1]}/${BASH_REMATCH[2]}] ${BASH_REMATCH[3]##*/}"
+    left=
+    [ $((SECONDS - from)) -lt 15 ] || left="$(minutes $(((SECONDS - from) * (BASH_REMATCH[2] - BASH_REMATCH[1]) / BASH_REMATCH[1]))) left  "
+    show_progress "$1" $((BASH_REMATCH[1] * 100 / BASH_REMATCH[2])) "$left[${BASH_REMATCH[1]}/${BASH_REMATCH[2]}] ${BASH_REMATCH[3]##*/}"
   done
   [ -z "$begun" ] || end_progress
 }
@@ -90,18 +101,35 @@ ensure_readers() {
   fi
 }
 
-# ensure_built PRESET TARGET...: builds when a source is newer than the last build.
+# Processor time of a first build, as measured (CONTRIBUTING.md), in seconds. cost TARGET
+cost() {
+  case $1 in
+    osteo) echo 660 ;;
+    osteo-*) echo 150 ;;
+    *) echo 1500 ;;
+  esac
+}
+
+# ensure_built PRESET TARGET...: builds the targets when a source is newer than their last build.
 ensure_built() {
-  local preset=$1 dir=$root/build/$1 newer title="Building" head
+  local preset=$1 dir=$root/build/$1 target title="Building" head old=() seconds=0
   shift
   head=$(git -C "$root" rev-parse HEAD 2>/dev/null || true)
-  if [ -e "$dir/.built-$1" ]; then
-    newer=$(find "$root/libs" "$root/apps" "$root/pipelines" "$root/tests" "$root/CMakeLists.txt" "$root/CMakePresets.json" -newer "$dir/.built-$1" -print -quit)
-    # A commit changes nothing but the version that the program tells; that counts too.
-    [ -z "$newer" ] && [ "$(cat "$dir/.built-$1")" = "$head" ] && return
-    title="Building what changed"
+  for target in "$@"; do
+    if [ ! -e "$dir/.built-$target" ]; then
+      old+=("$target")
+      seconds=$((seconds + $(cost "$target")))
+    elif [ -n "$(find "$root/libs" "$root/apps" "$root/pipelines" "$root/tests" "$root/CMakeLists.txt" "$root/CMakePresets.json" -newer "$dir/.built-$target" -print -quit)" ] ||
+      [ "$(cat "$dir/.built-$target")" != "$head" ]; then # a commit changes nothing but the version that the program tells; that counts too
+      old+=("$target")
+    fi
+  done
+  [ ${#old[@]} -gt 0 ] || return 0
+  set -- "${old[@]}"
+  if [ "$seconds" -gt 0 ]; then
+    say "Building $* for the first time: $(minutes $((seconds / $(nproc)))) on $(nproc) processors ..."
   else
-    say "Setting up the build (the first time takes some minutes in all) ..."
+    title="Building what changed"
   fi
   local began
   began=$(mktemp)
@@ -109,7 +137,9 @@ ensure_built() {
   : >"$dir.build.log"
   (export NINJA_STATUS='[%f/%t] '; cmake --build "$dir" --target "$@" 2>&1) | show_build "$title" "$dir.build.log" || { grep -E 'error|FAILED|undefined' "$dir.build.log" | head -n 40 >&2; say "The build failed; all of it is in $dir.build.log"; rm -f "$began"; exit 1; }
   # The time before the build: what was changed meanwhile is built next time.
-  printf '%s\n' "$head" >"$dir/.built-$1"
-  touch -r "$began" "$dir/.built-$1"
+  for target in "$@"; do
+    printf '%s\n' "$head" >"$dir/.built-$target"
+    touch -r "$began" "$dir/.built-$target"
+  done
   rm -f "$began"
 }

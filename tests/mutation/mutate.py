@@ -16,7 +16,7 @@ LIBRARIES = {
     "rt": (["libs/core/rt/src/*.cpp", "libs/core/rt/include/osteo/core/rt/*.h"], ["test_rt"]),
     "haptics": (["libs/simulation/haptics/src/*.cpp"], ["test_haptics", "test_scene"]),
     "bone": (["libs/simulation/bone/src/*.cpp"], ["test_bone", "test_haptics", "test_scene"]),
-    "session": (["libs/session/recording/src/*.cpp"], ["test_recording", "test_scene"]),
+    "recording": (["libs/session/recording/src/*.cpp"], ["test_recording", "test_scene"]),
     "scene": (["libs/session/scene/src/*.cpp"], ["test_scene"]),
     "dicom": (["libs/imaging/dicom/src/plac*.cpp"], ["test_dicom"]),
 }
@@ -68,8 +68,8 @@ class Worker:
             if source.is_file() and not (target.exists() and target.read_bytes() == source.read_bytes()):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target)
-        # As the release preset, so that a compiler cache has most of it already.
-        options = ["-DCMAKE_BUILD_TYPE=Release", f"-DOSTEO_SHARED_DATA={ROOT}/../shared/data"]
+        # Each source alone, so that one change is one small compilation.
+        options = ["-DCMAKE_BUILD_TYPE=Release", "-DOSTEO_UNITY=0", f"-DOSTEO_SHARED_DATA={ROOT}/../shared/data"]
         subprocess.run(["cmake", "-S", folder, "-B", self.build, "-G", "Ninja", *options], check=True, stdout=subprocess.DEVNULL)
 
     def make(self, targets):

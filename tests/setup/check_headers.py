@@ -41,10 +41,15 @@ def compiles(command, cwd, header):
 library_of, first = {}, set()
 for entry in json.loads((build / "compile_commands.json").read_text()):
     path = pathlib.Path(entry["directory"], entry["file"]).resolve()
-    found = re.match(r"libs/([a-z_]+)/src/", str(path.relative_to(source))) if path.is_relative_to(source) else None
+    # Sources of a library that are compiled as one are listed in a file that the build makes; those that stand alone prove their first include.
+    if found := re.match(r"libs/[a-z]+/([a-z_]+)/src/", str(path.relative_to(source))) if path.is_relative_to(source) else None:
+        first.add(first_include(path))
+    elif path.is_relative_to(build):
+        found = re.match(r"libs/[a-z]+/CMakeFiles/osteo_([a-z_]+)\.dir/Unity/", str(path.relative_to(build)))
+        if found:
+            first.add(first_include(pathlib.Path(first_include(path))))
     if found:
         library_of.setdefault(found[1], (options(entry["command"]), entry["directory"]))
-        first.add(first_include(path))
 if not library_of:
     sys.exit(f"{build}/compile_commands.json names no source of {source}/libs")
 
@@ -57,8 +62,8 @@ with tempfile.TemporaryDirectory() as scratch:
 
 alone = here = 0
 left_out, failed = set(), []
-for header in sorted(source.glob("libs/*/include/**/*.h")):
-    library, name = header.relative_to(source).parts[1], str(header).split("/include/", 1)[1]
+for header in sorted(source.glob("libs/*/*/include/**/*.h")):
+    library, name = header.relative_to(source).parts[2], str(header).split("/include/", 1)[1]
     if library not in library_of:
         left_out.add(library)
     elif name in first:

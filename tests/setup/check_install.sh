@@ -28,9 +28,9 @@ bash -n "$p/share/bash-completion/completions/osteo"
 # No path of the source or build tree in what others read.
 ! grep -rlF -e "$source/libs" -e "$build" "$p"/lib*/cmake "$p"/lib/*/cmake 2>/dev/null || { echo "the installation names the tree it was built in"; exit 1; }
 outside() { cmake -S "$source/tests/setup/outside" -B "$work/outside" -DCMAKE_PREFIX_PATH="$p" -DCMAKE_BUILD_TYPE=Release "$@" >"$work/said" 2>&1; }
-! outside -DEXAMPLES="import;hearing" || { echo "a component that does not exist was found"; exit 1; }
+! outside -DEXAMPLES="imaging;hearing" || { echo "a component that does not exist was found"; exit 1; }
 tr -s ' \n' ' ' <"$work/said" | grep -q "osteo has no component 'hearing'. This installation has: base .* geometry" || { tail -30 "$work/said"; exit 1; }
-outside -DEXAMPLES="import;geometry;haptics;tissue;rehearsal;assessment;pictures" || { tail -30 "$work/said"; exit 1; }
+outside -DEXAMPLES="imaging;geometry;haptics;tissue;session;assessment;display" || { tail -30 "$work/said"; exit 1; }
 cmake --build "$work/outside" >"$work/said" 2>&1 || { tail -30 "$work/said"; exit 1; }
 # Each component's example knows what must come out.
 ctest --test-dir "$work/outside" --output-on-failure >"$work/said" 2>&1 || { tail -60 "$work/said"; exit 1; }

@@ -8,6 +8,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/network/wire/server.h"
+#include "window_program.h"
 
 namespace osteo {
 
@@ -26,22 +27,11 @@ cli::CommandInfo ConsoleCommand::info() {
 
 int ConsoleCommand::run(const Params& p, cli::Invocation& io) {
   static_cast<void>(wire_address(io.arguments[0]));
-  // The window is a program of its own, so that servers need neither GLFW nor a display.
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-console";
-  if (!fs::exists(program))
-    throw Error(ExitCode::failed, "this build has no window (osteo-console is missing)", "build with -DOSTEO_WINDOW=ON");
-  std::vector<std::string> args{program.string(), io.arguments[0]};
+  std::vector<std::string> args{window_program("osteo-console", ""), io.arguments[0]};
   ConsoleFlags flags = p, defaults;
   const auto usual = fields_of<ConsoleFlags>(defaults), given = fields_of<ConsoleFlags>(flags);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() != usual[i].to_text()) args.push_back(given[i].flag() + "=" + given[i].to_text());
-  }
-  if (io.common.quiet) args.emplace_back("--quiet");
-  std::vector<char*> argv;
-  for (auto& a : args) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  ::execv(program.c_str(), argv.data());
-  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+  add_changed_flags(args, given, usual, io);
+  become(std::move(args), io);
 }
 
 }  // namespace osteo

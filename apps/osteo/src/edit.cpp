@@ -9,6 +9,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/session/scene/case.h"
+#include "window_program.h"
 
 namespace osteo {
 
@@ -43,25 +44,12 @@ int EditCommand::run(const Params& p, cli::Invocation& io) {
     if (!p.scan.empty()) call.arguments.push_back(p.scan);
     return PrepareCommand::run(prepare, call);
   }
-  // The window is a program of its own, so that servers need neither GLFW nor a display.
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-edit";
-  if (!fs::exists(program)) {
-    throw Error(ExitCode::failed, "this build has no window (osteo-edit is missing)",
-                "build with -DOSTEO_WINDOW=ON, or use --apply edits.json");
-  }
-  std::vector<std::string> args{program.string(), folder.string()};
+  std::vector<std::string> args{window_program("osteo-edit", "use --apply edits.json"), folder.string()};
   EditFlags flags = p, defaults;
   const auto usual = fields_of<EditFlags>(defaults), given = fields_of<EditFlags>(flags);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() != usual[i].to_text()) args.push_back(given[i].flag() + "=" + given[i].to_text());
-  }
-  if (io.common.quiet) args.emplace_back("--quiet");
+  add_changed_flags(args, given, usual, io);
   if (io.common.threads != 0) args.push_back("--threads=" + std::to_string(io.common.threads));
-  std::vector<char*> argv;
-  for (auto& a : args) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  ::execv(program.c_str(), argv.data());
-  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+  become(std::move(args), io);
 }
 
 }  // namespace osteo

@@ -16,6 +16,7 @@
 #include "osteo/assessment/experiment/analysis.h"
 #include "osteo/core/report/sheet.h"
 #include "osteo/core/statistics/basics.h"
+#include "window_program.h"
 
 namespace osteo {
 namespace {
@@ -82,19 +83,10 @@ int write_report(const fs::path& folder, const ExperimentCommand::Params& p, cli
 }
 
 int open_window(const fs::path& folder, const ExperimentCommand::Params& p, const cli::Invocation& io) {
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-experiment";
-  if (!fs::exists(program))
-    throw Error(ExitCode::failed, "this build has no window (osteo-experiment is missing)",
-                "build with -DOSTEO_WINDOW=ON, or use --simulated --headless");
-  std::vector<std::string> args{program.string(), folder.string(), "--participant=" + p.participant, "--device=" + p.device};
+  std::vector<std::string> args{window_program("osteo-experiment", "use --simulated --headless"), folder.string(), "--participant=" + p.participant, "--device=" + p.device};
   if (p.retention) args.emplace_back("--retention");
   if (!p.state_file.empty()) args.push_back("--state-file=" + p.state_file);
-  if (io.common.quiet) args.emplace_back("--quiet");
-  std::vector<char*> argv;
-  for (auto& a : args) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  ::execv(program.c_str(), argv.data());
-  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+  become(std::move(args), io);
 }
 
 int run_participant(const fs::path& folder, const ExperimentCommand::Params& p, cli::Invocation& io) {

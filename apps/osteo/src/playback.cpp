@@ -17,6 +17,7 @@
 #include "osteo/session/scene/session_folder.h"
 #include "osteo/network/tutor/playback.h"
 #include "playback_words.h"
+#include "window_program.h"
 
 namespace osteo {
 namespace {
@@ -38,27 +39,18 @@ std::vector<Lesson> lessons_of(const std::string& list, const std::string& bone_
 
 // In the window: the same flags, as the window takes them.
 int open_window(const PlaybackCommand::Params& p, const SessionFolder& lesson, const cli::Invocation& io) {
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-rehearse";
-  if (!fs::exists(program))
-    throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
-                "build with -DOSTEO_WINDOW=ON, or use --headless");
   PlaybackParams mine = p, usual;
   std::string as = "from_s=" + format_number(p.from_s) + ",to_s=" + format_number(p.to_s);
   const auto given = fields_of<PlaybackParams>(mine), defaults = fields_of<PlaybackParams>(usual);
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (given[i].to_text() != defaults[i].to_text()) as += "," + std::string(given[i].doc.name) + "=" + given[i].to_text();
   }
-  std::vector<std::string> args{program.string(), lesson.case_folder.string(), "--playback=" + lesson.folder.string(),
+  std::vector<std::string> args{window_program("osteo-rehearse", "use --headless"), lesson.case_folder.string(), "--playback=" + lesson.folder.string(),
                                 "--playback-as=" + as};
   if (!p.out.empty()) args.push_back("--out=" + p.out);
   if (!p.state_file.empty()) args.push_back("--state-file=" + p.state_file);
   args.push_back("--device=" + std::string(EnumNames<Hand>::values[static_cast<std::size_t>(p.device)]));
-  if (io.common.quiet) args.emplace_back("--quiet");
-  std::vector<char*> argv;
-  for (auto& a : args) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  ::execv(program.c_str(), argv.data());
-  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+  become(std::move(args), io);
 }
 
 }  // namespace

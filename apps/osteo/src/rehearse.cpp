@@ -22,30 +22,19 @@
 #include "osteo/display/view/world_view.h"
 #include "osteo/network/wire/rehearsal_stream.h"
 #include "osteo/network/wire/tracked_hand.h"
+#include "window_program.h"
 
 namespace osteo {
 namespace {
 
 // The window is a program of its own, so that servers need neither GLFW nor a display.
 int open_window(const RehearseCommand::Params& p, const cli::Invocation& io) {
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "osteo-rehearse";
-  if (!fs::exists(program))
-    throw Error(ExitCode::failed, "this build has no window (osteo-rehearse is missing)",
-                "build with -DOSTEO_WINDOW=ON, or use --headless");
-  std::vector<std::string> args{program.string()};
+  std::vector<std::string> args{window_program("osteo-rehearse", "use --headless")};
   args.insert(args.end(), io.arguments.begin(), io.arguments.end());
   WindowFlags flags = p, defaults;
   const auto usual = fields_of<WindowFlags>(defaults), given = fields_of<WindowFlags>(flags);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].to_text() != usual[i].to_text() || io.given.contains(std::string(given[i].doc.name)))
-      args.push_back(given[i].flag() + "=" + given[i].to_text());
-  }
-  if (io.common.quiet) args.emplace_back("--quiet");
-  std::vector<char*> argv;
-  for (auto& a : args) argv.push_back(a.data());
-  argv.push_back(nullptr);
-  ::execv(program.c_str(), argv.data());
-  throw Error(ExitCode::failed, "cannot start '" + program.string() + "': " + std::strerror(errno));
+  add_changed_flags(args, given, usual, io);
+  become(std::move(args), io);
 }
 
 }  // namespace

@@ -66,11 +66,9 @@ TEST(Json, WhatIsNoJsonIsToldWithItsLineAndWithoutTheLibrarysName) {
 }
 
 enum class Colour : int { red, green };
-}  // namespace
 [[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(Colour) {
   return {"red", "green"};
 }
-namespace {
 
 struct Part {
   double kerf_mm = 0.5;

@@ -19,10 +19,12 @@
 
 namespace osteo {
 
+inline namespace simulation {  // where World's friend is
 struct WorldProbe {
   static std::uint32_t& next_brick(World& w) { return w.next_brick_; }
   static std::uint32_t& next_body(World& w) { return w.next_body_; }
 };
+}  // namespace simulation
 
 namespace {
 
