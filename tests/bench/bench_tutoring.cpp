@@ -155,10 +155,10 @@ void flood_row(double packets_a_s, double seconds) {
   std::vector<Bytes> kinds;
   for (int i = 0; i < 64; ++i) {
     const Pairing::Nonce a = Pairing::make_nonce();
-    Bytes b(i % 4 == 1 ? 128 : 600);
+    Bytes b(600);
     for (std::size_t k = 0; k < b.size(); ++k) b[k] = static_cast<std::uint8_t>(a[k % a.size()] + k * 31);
-    if (i % 4 == 1) b[0] = b[1] = b[2] = b[3] = 0, b[4] = 1, b[5] = kTutorProtocol, b[22] = 2;  // asks to join
-    if (i % 4 == 2) b[0] = 1, b[1] = b[2] = b[3] = 0;                                           // of a connection that may be there
+    if (i % 4 == 1) b = *PairingGuest("AAAAAAAA", JoinRole::watcher).poll(0);  // asks to join
+    if (i % 4 == 2) b[0] = 1, b[1] = b[2] = b[3] = 0;                          // of a connection that may be there
     kinds.push_back(b);
   }
   const double before = bench::resident_mb();

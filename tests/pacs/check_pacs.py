@@ -352,6 +352,9 @@ def watch():
     # What is wrong is told before anything is made.
     r = run(osteo, "watch", inbox, "--rules", "wrong.json", "-o", out, rc=2)
     assert "spacing_m" in r.stderr and "spacing_mm" in r.stderr and not out.exists(), r.stderr
+    (work / "value.json").write_text(json.dumps(rules).replace('"spacing_mm": "3"', '"spacing_mm": "many"'))
+    r = run(osteo, "watch", inbox, "--rules", "value.json", "-o", out, rc=2)
+    assert "rule 'ear': spacing_mm" in r.stderr and not out.exists(), r.stderr
     run(osteo, "watch", inbox, "-o", out, rc=2)
     run(osteo, "watch", inbox, "--rules", "rules.json", "-o", inbox / "out", rc=2)
     run(osteo, "watch", work / "nowhere", "--rules", "rules.json", "-o", out, rc=3)

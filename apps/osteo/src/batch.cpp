@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "batch_command.h"
+#include "case_pipeline.h"
 #include "commands/prepare.h"
 #include "program.h"
 #include "osteo/core/base/error.h"
@@ -103,6 +104,30 @@ std::vector<FieldRef> case_fields(PrepareCommand::Params& params) {
   return fields;
 }
 
+void check_case_settings(const std::string& text, const std::map<std::string, std::string>& settings,
+                         const Registry& registry) {
+  PrepareCommand::Params prepare;
+  const auto fields = case_fields(prepare);
+  Recipe recipe;
+  for (const auto& [name, value] : settings) {
+    const auto field =
+        std::find_if(fields.begin(), fields.end(), [&](const FieldRef& f) { return f.doc.name == name; });
+    if (field != fields.end()) field->from_text(value, name);
+    if (name == "structures" || name == "edits" || value.empty()) continue;
+    recipe.settings[name] = field != fields.end() ? field->to_text() : value;
+  }
+  const bool has_lower = recipe.settings.contains("lower"), has_preset = recipe.settings.contains("preset");
+  if (prepare.preset != BonePreset::fixed && has_lower)
+    throw Error(ExitCode::usage,
+                "lower does nothing with preset '" + recipe.settings["preset"] + "', which finds the threshold itself",
+                "give one of them");
+  if (recipe.settings.contains("names") && prepare.structures.empty())
+    throw Error(ExitCode::usage, "names is for structures, which the case does not have", "give structures");
+  Pipeline pipeline =
+      case_pipeline(text, recipe, "source", prepare.structures, false, "case", std::nullopt, has_lower || has_preset);
+  validate(pipeline, registry);
+}
+
 int make_case(std::vector<std::string> arguments, const std::map<std::string, std::string>& settings, const fs::path& folder) {
   PrepareCommand::Params prepare;
   const auto fields = case_fields(prepare);
@@ -176,6 +201,15 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     return exit_code_of(result);
   }
 
+  const std::map<std::string, std::string> of_all(io.settings.begin(), io.settings.end());
+  const auto with_common = [&](const std::map<std::string, std::string>& own) {
+    std::map<std::string, std::string> settings = of_all;
+    for (const auto& [name, value] : own) settings[name] = value;
+    return settings;
+  };
+  check_batch_table(table, table_file,
+                    [&](const auto& own) { check_case_settings(pipeline, with_common(own), io.registry); });
+
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   BatchOptions options;
   options.out = out;
@@ -208,9 +242,7 @@ int BatchCommand::run(const Params& p, cli::Invocation& io) {
     if (!pipeline_file.empty()) a.insert(a.end(), {"--pipeline", pipeline_file});
     if (p.no_report) a.emplace_back("--no-report");
     if (io.common.force) a.emplace_back("--force");
-    std::map<std::string, std::string> settings(io.settings.begin(), io.settings.end());
-    for (const auto& [name, value] : row.settings) settings[name] = value;
-    return make_case(std::move(a), settings, folder);
+    return make_case(std::move(a), with_common(row.settings), folder);
   };
   if (!io.common.quiet) {
     io.err << table.size() << " cases, " << options.jobs << " at a time with " << threads << (threads == 1 ? " thread" : " threads")

@@ -12,6 +12,10 @@ namespace osteo {
 
 /// What prepare takes, by name, but for what whoever makes many cases decides itself.
 [[nodiscard]] std::vector<FieldRef> case_fields(PrepareCommand::Params& params);
+/// What 'osteo prepare' would say of these settings before it reads anything: values, ranges, choices, what goes with
+/// what, and those of the pipeline. Error(usage).
+void check_case_settings(const std::string& pipeline, const std::map<std::string, std::string>& settings,
+                         const Registry& registry);
 /// In a child: what 'osteo prepare' does with these arguments and settings (of its own, or the pipeline's), and a small preview.
 int make_case(std::vector<std::string> arguments, const std::map<std::string, std::string>& settings, const fs::path& folder);
 

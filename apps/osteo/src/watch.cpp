@@ -10,6 +10,7 @@
 #include "osteo/core/base/json_document.h"
 #include "osteo/hospital/pacs/orthanc.h"
 #include "osteo/imaging/pipeline/pipeline.h"
+#include "osteo/app/stages/registry.h"
 #include "pacs_commands.h"
 #include "built_in_pipelines.h"
 
@@ -29,6 +30,11 @@ void check_rule(const SeriesRule& rule) {
     const std::string near = nearest_name(name, known);
     throw Error(ExitCode::usage, "rule '" + rule.name + "' sets " + name + ": that is no setting of a case",
                 near.empty() ? "'osteo help prepare' shows them" : "did you mean '" + near + "'?");
+  }
+  try {
+    check_case_settings(text, rule.set, osteo_stages());
+  } catch (const Error& e) {
+    throw Error(ExitCode::usage, "rule '" + rule.name + "': " + e.what(), e.advice());
   }
 }
 

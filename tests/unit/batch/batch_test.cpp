@@ -56,6 +56,115 @@ TEST(BatchTable, WhatIsWrongIsToldWithItsLine) {
   EXPECT_EQ(what_is_wrong("case,source\n" + std::string(64, 'a') + ",a\n"), "");
 }
 
+// One table, as spreadsheets of different languages and systems write it.
+TEST(BatchTable, IsReadAsSpreadsheetsWriteIt) {
+  const std::vector<std::string> known{"lower", "names"}, paths;
+  const std::string name = "M\xc3\xbcller \xf0\x9f\xa6\xb4.nrrd";  // an umlaut, and a character beyond the first 65,536
+  const std::string plain = "case,source,lower,names\nA," + name + ",400,\"1=a, 2=b\"\nB,b.nrrd,,\n";
+  const auto rows_of = [&](const std::string& text) { return read_batch_table(text, "/data/t.csv", known, paths); };
+  const auto same = [&](const std::string& text, std::size_t line = 3) {
+    const auto rows = rows_of(text);
+    ASSERT_EQ(rows.size(), 2U) << text;
+    EXPECT_EQ(rows[0].source, "/data/" + name);
+    EXPECT_EQ(rows[0].settings, (std::map<std::string, std::string>{{"lower", "400"}, {"names", "1=a, 2=b"}}));
+    EXPECT_EQ(rows[1].code, "B");
+    EXPECT_EQ(rows[1].line, line);
+  };
+  const auto replaced = [](std::string text, const std::string& what, const std::string& by) {
+    for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+      text.replace(at, what.size(), by);
+    return text;
+  };
+  const auto utf16 = [](const std::string& text, bool big) {
+    std::string out = big ? "\xfe\xff" : "\xff\xfe";
+    const auto unit = [&](unsigned c) {
+      const char high = static_cast<char>(c >> 8), low = static_cast<char>(c & 0xff);
+      out += big ? std::string{high, low} : std::string{low, high};
+    };
+    for (std::size_t at = 0; at < text.size(); ++at) {
+      const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[at + i]); };
+      if (byte(0) < 0x80) {
+        unit(byte(0));
+      } else if (byte(0) < 0xe0) {
+        unit((byte(0) & 0x1fU) << 6 | (byte(1) & 0x3fU)), at += 1;
+      } else {
+        const unsigned c =
+            ((byte(0) & 7U) << 18 | (byte(1) & 0x3fU) << 12 | (byte(2) & 0x3fU) << 6 | (byte(3) & 0x3fU)) - 0x10000;
+        unit(0xd800 + (c >> 10)), unit(0xdc00 + (c & 0x3ff)), at += 3;
+      }
+    }
+    return out;
+  };
+  const std::string semicolons = "case;source;lower;names\nA;" + name + ";400;1=a, 2=b\nB;b.nrrd;;\n",
+                    tabs = replaced(semicolons, ";", "\t");
+  for (const std::string& text : {plain, semicolons, tabs}) {
+    same(text);
+    same("\xef\xbb\xbf" + text);
+    same(replaced(text, "\n", "\r\n"));
+    same(replaced(text, "\n", "\r"));
+    same(utf16(text, false));
+    same(utf16(replaced(text, "\n", "\r\n"), true));
+  }
+  same("sep=;\r\n" + semicolons, 4);
+  // What a spreadsheet leaves behind: rows of nothing, of any length.
+  same(plain + ",,,\n,,,\n\n,\n");
+  same(semicolons + ";;;\n;\r\n");
+  same(replaced(plain, "B,", ",,,\nB,"), 4);
+  // A quoted field keeps what separates elsewhere, and its lines.
+  const auto rows = rows_of("case;source\n\"A\";\"x;y,z\n;;\n\"\"1\"\".nrrd\"\n");
+  ASSERT_EQ(rows.size(), 1U);
+  EXPECT_EQ(rows[0].source, "/data/x;y,z\n;;\n\"1\".nrrd");
+}
+
+TEST(BatchTable, WhatIsNoTextIsToldWithItsLine) {
+  EXPECT_NE(what_is_wrong("case,source\nA,a\nB,M\xfcller\n").find("line 3: a letter that is not in UTF-8"),
+            std::string::npos);
+  EXPECT_NE(what_is_wrong("case,source\nB,M\xfcller\n").find("CSV UTF-8"), std::string::npos);
+  for (const char* bad :
+       {"\xc3", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xf4\x90\x80\x80", "\x80"})
+    EXPECT_NE(what_is_wrong("case,source\nA," + std::string(bad) + "\n").find("line 2: a letter"), std::string::npos)
+        << bad;
+  EXPECT_NE(what_is_wrong(std::string("c\0a\0s\0e\0", 8)).find("line 1: there is a zero byte"), std::string::npos);
+  EXPECT_NE(what_is_wrong(std::string("\xff\xfe"
+                                      "a\0\n\0\0\xd8"
+                                      "b\0",
+                                      10))
+                .find("line 2: half a character"),
+            std::string::npos);
+  EXPECT_NE(what_is_wrong(std::string("\xff\xfe"
+                                      "a\0b",
+                                      5))
+                .find("line 1: half a character"),
+            std::string::npos);
+  EXPECT_NE(what_is_wrong("case;source\n;a.nrrd\n").find("line 2: '' is no code"), std::string::npos);
+  EXPECT_NE(what_is_wrong("case;source\nA;b;c\n").find("line 2: 3 fields where the first line names 2"),
+            std::string::npos);
+}
+
+TEST(BatchTable, ValuesOfAllRowsAreAskedAboutBeforeAnything) {
+  const std::vector<std::string> known{"lower"}, paths;
+  std::string text = "case,source,lower\n";
+  for (int i = 0; i < 40; ++i)
+    text += "C" + std::to_string(i) + ",a," + (i % 10 == 5 ? "abc" : i == 17 ? "99999" : "300") + "\n";
+  const auto rows = read_batch_table(text, "/data/t.csv", known, paths);
+  int asked = 0;
+  const auto check = [&](const std::map<std::string, std::string>& settings) {
+    ++asked;
+    if (settings.at("lower") != "300")
+      throw Error(ExitCode::usage, "lower: '" + settings.at("lower") + "' is no number", "give one");
+  };
+  try {
+    check_batch_table(rows, "/data/t.csv", check);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::usage);
+    EXPECT_STREQ(e.what(), "'/data/t.csv' line 7: lower: 'abc' is no number (and 4 more: lines 17, 19, 27, 37)");
+    EXPECT_EQ(e.advice(), "give one");
+  }
+  EXPECT_EQ(asked, 3);
+  check_batch_table(std::span(rows).first(5), "/data/t.csv", check);
+}
+
 TEST(BatchNames, AreNotInMessages) {
   const fs::path source = "/data/JONES_1953/ct.nrrd";
   EXPECT_EQ(without_names("'/data/JONES_1953/ct.nrrd' is damaged", source), "'(name withheld)' is damaged");

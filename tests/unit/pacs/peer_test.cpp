@@ -39,7 +39,7 @@ TEST(Receive, CountsAreWrittenAsPrometheusReadsThem) {
   c.stored = 7;
   const std::string text = metrics_text(c);
   EXPECT_NE(text.find("# TYPE osteotome_receive_stored_total counter\nosteotome_receive_stored_total 7\n"), std::string::npos) << text;
-  EXPECT_EQ(std::ranges::count(text, '\n'), 3 * 8);
+  EXPECT_EQ(std::ranges::count(text, '\n'), 3 * 10);
 }
 
 TEST(Send, WhatIsNoObjectIsNotSent) {

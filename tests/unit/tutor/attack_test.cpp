@@ -53,7 +53,9 @@ TEST(Attack, TheRightCodeJoinsAndSettingsArrive) {
   ASSERT_EQ(m.host.status(m.now).size(), 1U);
   // Nobody's place twice; watchers have theirs.
   LiveGuest second(kCode, JoinRole::trainee, m.shown), watcher(kCode, JoinRole::watcher, m.shown);
-  m.talk(second, 300, 6);
+  for (int i = 0; i < 500; ++i) m.talk(guest, 1), m.talk(second, 1, 6), m.talk(watcher, 1, 7);
+  EXPECT_EQ(guest.state(), JoinState::joined);
+  EXPECT_EQ(watcher.state(), JoinState::joined);
   EXPECT_EQ(second.state(), JoinState::refused);
   EXPECT_NE(second.why().find("trainee"), std::string::npos);
 }

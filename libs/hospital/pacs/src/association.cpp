@@ -3,9 +3,11 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <exception>
@@ -53,10 +55,52 @@ bool same_data_set(const fs::path& a, const fs::path& b) {
   return true;
 }
 
+SharedCounts* counts_of_process = nullptr;
+
+// When this process ends, whoever keeps it waiting: DCMTK's own limits are for each read, and one byte is enough for
+// each.
+class Deadline {
+ public:
+  Deadline(const ReceiveOptions& options, SharedCounts& counts) : timeout_s_(options.timeout_s) {
+    counts_of_process = &counts;
+    std::signal(SIGALRM, [](int) {
+      ++counts_of_process->timed_out;
+      ::_exit(4);
+    });
+    end_s_ = now_s() + options.association_s;
+    message();
+  }
+  /// One begins.
+  void message() {
+    begin_s_ = now_s();
+    came(0);
+  }
+  /// Of its object, so much has come.
+  void came(std::uint64_t bytes) { set(begin_s_ + timeout_s_ + static_cast<double>(bytes) / kReceiveBytesPerS); }
+  /// It is whole: what we do with it is no peer's fault.
+  void none() { set(end_s_); }
+
+ private:
+  static double now_s() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  }
+  void set(double at_s) const {
+    const double in_s = std::max(0.001, std::min(at_s, end_s_) - now_s());
+    itimerval t{};
+    t.it_value.tv_sec = static_cast<time_t>(in_s);
+    t.it_value.tv_usec = static_cast<suseconds_t>((in_s - std::floor(in_s)) * 1e6);
+    if (t.it_value.tv_sec == 0 && t.it_value.tv_usec == 0) t.it_value.tv_usec = 1;
+    ::setitimer(ITIMER_REAL, &t, nullptr);
+  }
+  const double timeout_s_;
+  double end_s_ = 0, begin_s_ = 0;
+};
+
 struct Serving {
   const fs::path& folder;
   const ReceiveOptions& options;
   SharedCounts& counts;
+  Deadline& deadline;
   int pipe;
   fs::path file;            // that is coming in
   std::uint64_t bytes = 0;  // of its data set, so far
@@ -81,7 +125,6 @@ unsigned keep(Serving& s, const T_DIMSE_C_StoreRQ& request) {
     ++s.counts.again;
     return STATUS_Success;
   }
-  s.counts.folder_bytes += s.bytes;
   s.counts.bytes += s.bytes;
   ++s.counts.stored;
   const std::string line = place.parent_path().string() + "\n";
@@ -93,14 +136,16 @@ bool room(const Serving& s) {
   struct statvfs disk {};
   if (::statvfs(s.folder.c_str(), &disk) != 0) return false;
   return static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) > s.options.keep_free_gb * 1e9 &&
-         static_cast<double>(s.counts.folder_bytes) < s.options.folder_gb * 1e9;
+         static_cast<double>(s.counts.folder_before) + static_cast<double>(s.counts.bytes) < s.options.folder_gb * 1e9;
 }
 
 void came(void* data, T_DIMSE_StoreProgress* progress, T_DIMSE_C_StoreRQ* request, char*, DcmDataset**, T_DIMSE_C_StoreRSP* response,
           DcmDataset**) {
   Serving& s = *static_cast<Serving*>(data);
   if (progress->progressBytes > 0) s.bytes = static_cast<std::uint64_t>(progress->progressBytes);
+  s.deadline.came(s.bytes);
   if (progress->state != DIMSE_StoreEnd) return;
+  s.deadline.none();
   // Before this, DCMTK has set the status to what happened on the way.
   if (response->DimseStatus == STATUS_Success) response->DimseStatus = static_cast<Uint16>(room(s) ? keep(s, *request) : kNoRoom);
   if (response->DimseStatus != STATUS_Success) ++s.counts.refused;
@@ -110,6 +155,8 @@ OFCondition store(T_ASC_Association* association, T_ASC_PresentationContextID id
   char name[32];
   static int number = 0;
   std::snprintf(name, sizeof name, "%d-%d", ::getpid(), number++);
+  ::mkdir((s.folder / kIncoming).c_str(),
+          0777);  // whoever has emptied the inbox may have taken it; not more than it: a disk may be away
   s.file = s.folder / kIncoming / name;
   s.bytes = 0;
   const int timeout = static_cast<int>(std::ceil(s.options.timeout_s));
@@ -195,8 +242,7 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
 #endif
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGALRM, SIG_DFL);
-  ::alarm(static_cast<unsigned>(std::ceil(options.association_s)));
+  Deadline deadline(options, counts);
   quiet_dcmtk(options.timeout_s);
   const int timeout = static_cast<int>(std::ceil(options.timeout_s));
   T_ASC_Network* network = nullptr;
@@ -211,11 +257,16 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
     ::_exit(2);
   }
   if (!let_in(association, options, counts)) ::_exit(2);
-  Serving s{folder, options, counts, pipe, {}, 0};
+  Serving s{folder, options, counts, deadline, pipe, {}, 0};
   for (;;) {
+    // Waiting for a message has its own time. What was read before may hold the next one, and nothing is on its way.
+    deadline.none();
+    const bool waits = ASC_dataWaiting(association, timeout);
+    deadline.message();
     T_DIMSE_Message message{};
     T_ASC_PresentationContextID id = 0;
-    const OFCondition got = DIMSE_receiveCommand(association, DIMSE_NONBLOCKING, timeout, &id, &message, nullptr);
+    const OFCondition got =
+        DIMSE_receiveCommand(association, DIMSE_NONBLOCKING, waits ? timeout : 1, &id, &message, nullptr);
     if (got == DUL_PEERREQUESTEDRELEASE) {
       ASC_acknowledgeRelease(association);
       ASC_dropSCPAssociation(association, 1);
@@ -223,6 +274,7 @@ void serve(int connection, int pipe, const fs::path& folder, const ReceiveOption
     }
     if (got == DUL_PEERABORTEDASSOCIATION) ::_exit(0);
     OFCondition done = got;
+    if (got == DIMSE_NODATAAVAILABLE) ++counts.timed_out;
     if (got.good()) {
       switch (message.CommandField) {
         case DIMSE_C_ECHO_RQ:

@@ -9,8 +9,13 @@ namespace osteo::inline hospital::pacs {
 
 /// What parent and children share: a page of memory.
 struct SharedCounts {
-  std::atomic<std::uint64_t> stored{0}, again{0}, refused{0}, bytes{0}, folder_bytes{0}, refused_associations{0};
+  std::atomic<std::uint64_t> stored{0}, again{0}, refused{0}, bytes{0}, refused_associations{0}, timed_out{0};
+  /// What the folder held when it was measured, less `bytes` just before: with `bytes` it is what it holds now, never
+  /// less but for what others put into it since.
+  std::atomic<std::int64_t> folder_before{0};
 };
+static_assert(
+    std::atomic<std::uint64_t>::is_always_lock_free);  // counted in a signal's handler, and by several processes
 
 inline constexpr std::string_view kIncoming = ".incoming";
 

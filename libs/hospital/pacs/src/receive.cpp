@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -14,10 +15,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
-#include <map>
 #include <new>
 
 #include "association.h"
+#include "inbox.h"
 
 namespace osteo::inline hospital {
 namespace {
@@ -25,7 +26,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using pacs::SharedCounts;
 
-constexpr const char* kClosed = "CLOSED";
+// The folder is measured as an association begins and every so often, but for no more than a twentieth of the time.
+constexpr std::chrono::seconds kMeasureEvery{10};
+constexpr int kMeasureShare = 20;
 
 struct Descriptor {
   int value = -1;
@@ -94,18 +97,16 @@ struct Child {
 class Node {
  public:
   Node(fs::path folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context)
-      : folder_(std::move(folder)), options_(options), events_(events), context_(context) {
+      : folder_(std::move(folder)),
+        options_(options),
+        events_(events),
+        context_(context),
+        inbox_(folder_, options.quiet_s, [this](const std::string& what) { context_.warn(what); }) {
     make_output_folder(folder_ / pacs::kIncoming);
-    for (const auto& left : fs::directory_iterator(folder_ / pacs::kIncoming)) fs::remove(left.path());  // of a process that died
-    for (const auto& study : fs::directory_iterator(folder_)) {
-      if (!study.is_directory() || !study.path().filename().string().starts_with("study-")) continue;
-      for (const auto& series : fs::directory_iterator(study.path())) {
-        if (!series.is_directory()) continue;
-        const ClosedSeries known = look(series.path());
-        (*counts_).folder_bytes += known.bytes;
-        if (known.objects > 0 && !fs::exists(series.path() / kClosed)) open_[series.path()] = Clock::now();
-      }
-    }
+    lock();
+    clear_incoming({});  // of a process that died
+    measure();
+    inbox_.open_unclosed(Clock::now());
     int port = 0;
     listener_ = listen_at(options_, port);
     if (events_.listening) events_.listening(port);
@@ -127,21 +128,48 @@ class Node {
         if (watched[n + 1].revents != 0) hear(children_[n]);
       bury();
       if ((watched[0].revents & POLLIN) != 0) accept();
-      close_quiet();
+      for (const ClosedSeries& closed : inbox_.close_quiet(Clock::now())) {
+        ++seen_.closed;
+        if (events_.closed) events_.closed(closed);
+      }
+      if (Clock::now() - measured_at_ > kMeasureEvery) measure();
       tell(false);
     }
     tell(true);
   }
 
  private:
-  static ClosedSeries look(const fs::path& series) {
-    ClosedSeries c{series, 0, 0};
-    for (const auto& file : fs::directory_iterator(series)) {
-      if (file.path().extension() != ".dcm") continue;
-      ++c.objects;
-      c.bytes += file.file_size();
-    }
-    return c;
+  // Two nodes in one folder would clear away what the other is writing.
+  void lock() {
+    lock_ = Descriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    // A file system without locks (some of a network's) is taken as it is.
+    if (lock_.value >= 0 && ::flock(lock_.value, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      throw Error(ExitCode::cannot_write, "another node receives into '" + folder_.string() + "'",
+                  "give another folder, or stop it");
+  }
+
+  // What processes whose names begin so were writing.
+  void clear_incoming(const std::string& begin) {
+    std::error_code error;
+    std::vector<fs::path> left;
+    for (fs::directory_iterator at(folder_ / pacs::kIncoming, error), end; !error && at != end; at.increment(error))
+      if (at->path().filename().string().starts_with(begin)) left.push_back(at->path());
+    for (const fs::path& path : left) fs::remove(path, error);
+  }
+
+  // How full the folder is, for all processes.
+  void measure() {
+    const auto begin = Clock::now();
+    if (measured_at_ != Clock::time_point{} && begin - measured_at_ < kMeasureShare * measuring_took_) return;
+    // Before: what comes while it is measured may count twice until the next time, but never not at all.
+    const auto came = static_cast<std::int64_t>((*counts_).bytes.load());
+    (*counts_).folder_before = static_cast<std::int64_t>(inbox_.measure(begin)) - came;
+    measured_at_ = Clock::now();
+    measuring_took_ = measured_at_ - begin;
+    std::error_code error;
+    const bool there = fs::is_directory(folder_, error);
+    if (!there && folder_there_) context_.warn("the inbox is gone: objects are refused until it is there again");
+    folder_there_ = there;
   }
 
   void accept() {
@@ -155,12 +183,15 @@ class Node {
       ++(*counts_).refused_associations;
       return;
     }
+    measure();
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return;
     Descriptor in(ends[0]), out(ends[1]);
     const pid_t pid = ::fork();
     if (pid == 0) {
       ::close(listener_.value);
+      if (lock_.value >= 0)
+        ::close(lock_.value);  // a node that is killed leaves the folder to the next one, whatever we still do
       for (const Child& c : children_) ::close(c.pipe.value);
       std::signal(SIGTERM, SIG_DFL);
       std::signal(SIGINT, SIG_IGN);  // Ctrl-C is for the parent, which ends us
@@ -185,11 +216,8 @@ class Node {
     // It has closed its end: it is going, and if it were stuck on its way nobody would come for it.
     if (n == 0) ::kill(child.pid, SIGKILL);
     for (std::size_t end = 0; (end = child.rest.find('\n')) != std::string::npos;) {
-      const fs::path series = folder_ / child.rest.substr(0, end);
+      inbox_.came(child.rest.substr(0, end), Clock::now());
       child.rest.erase(0, end + 1);
-      open_[series] = Clock::now();
-      std::error_code error;
-      fs::remove(series / kClosed, error);
     }
   }
 
@@ -204,27 +232,9 @@ class Node {
         ++seen_.died;
         context_.warn("the process of an association was ended by a limit or a fault");
       }
-      // What it was writing.
-      const std::string mine = std::to_string(c.pid) + "-";
-      for (const auto& left : fs::directory_iterator(folder_ / pacs::kIncoming))
-        if (left.path().filename().string().starts_with(mine)) fs::remove(left.path());
+      clear_incoming(std::to_string(c.pid) + "-");  // what it was writing
       return true;
     });
-  }
-
-  void close_quiet() {
-    for (auto at = open_.begin(); at != open_.end();) {
-      if (std::chrono::duration<double>(Clock::now() - at->second).count() < options_.quiet_s) {
-        ++at;
-        continue;
-      }
-      const ClosedSeries closed = look(at->first);
-      at = open_.erase(at);
-      if (closed.objects == 0) continue;
-      write_file(closed.folder / kClosed, std::to_string(closed.objects) + " objects\n");
-      ++seen_.closed;
-      if (events_.closed) events_.closed(closed);
-    }
   }
 
   void tell(bool last) {
@@ -235,10 +245,18 @@ class Node {
     now.again = c.again;
     now.refused = c.refused;
     now.bytes = c.bytes;
+    now.timed_out = c.timed_out;
+    now.gone = inbox_.gone();
     if (!last && (now == told_ || Clock::now() - told_at_ < std::chrono::seconds(1))) return;
     told_ = now;
     told_at_ = Clock::now();
-    if (events_.counters) events_.counters(now);
+    if (!events_.counters) return;
+    try {
+      events_.counters(now);
+      counters_failed_ = false;
+    } catch (const Error& e) {  // a full disk, say: no reason to refuse what still can be kept
+      if (!std::exchange(counters_failed_, true)) context_.warn(std::string("the counters: ") + e.what());
+    }
   }
 
   fs::path folder_;
@@ -248,7 +266,11 @@ class Node {
   SharedPage counts_;
   Descriptor listener_;
   std::vector<Child> children_;
-  std::map<fs::path, Clock::time_point> open_;  // series, and when something of them came
+  Descriptor lock_;
+  pacs::Inbox inbox_;
+  Clock::time_point measured_at_{};
+  Clock::duration measuring_took_{};
+  bool folder_there_ = true, counters_failed_ = false;
   ReceiveCounters seen_, told_;
   Clock::time_point told_at_{};
 };
@@ -273,11 +295,13 @@ std::string metrics_text(const ReceiveCounters& c) {
   row("associations", "connections", c.associations);
   row("refused_associations", "connections that were not let in", c.refused_associations);
   row("died", "processes of associations ended by a limit or a fault", c.died);
+  row("timed_out", "associations ended because a message, or all of it, took too long", c.timed_out);
   row("stored", "objects stored", c.stored);
   row("again", "objects that were there already", c.again);
   row("refused", "objects refused", c.refused);
   row("bytes", "bytes of data sets stored", c.bytes);
   row("closed_series", "series closed after quiet", c.closed);
+  row("gone_series", "series moved or deleted before they were closed", c.gone);
   return text;
 }
 

@@ -6,16 +6,15 @@
 namespace osteo::inline network {
 namespace {
 
-constexpr std::int64_t kGuestSendEveryUs = 2000, kAskEveryUs = 100'000, kLostUs = 2'000'000;
+constexpr std::int64_t kGuestSendEveryUs = 2000, kLostUs = 2'000'000;
 
 }  // namespace
 
 LiveGuest::LiveGuest(std::string_view tidy_code, JoinRole role, std::shared_ptr<FarDevice> host_hand)
-    : code_(tidy_code), role_(role), host_hand_(std::move(host_hand)), nonce_(Pairing::make_nonce()) {}
+    : role_(role), host_hand_(std::move(host_hand)), pairing_(tidy_code, role) {}
 
 void LiveGuest::receive(std::span<const std::uint8_t> packet, std::int64_t now_us) {
-  PairingFields f(packet);
-  if (!f.good) {
+  if (!PairingFields(packet).good) {
     if (!channel_) return;
     const auto plain = channel_->open(packet);
     if (!plain) {
@@ -35,34 +34,15 @@ void LiveGuest::receive(std::span<const std::uint8_t> packet, std::int64_t now_u
     }
     return;
   }
-  const auto nonce = f.take<Pairing::Nonce>();
-  if (!f.good || nonce != nonce_) return;
-  if (f.step == PairingStep::challenge && state_ == JoinState::asking && !pairing_) {
-    host_nonce_ = f.take<Pairing::Nonce>();
-    const auto share = f.take<Pairing::Share>();
-    if (!f.good) return;
-    auto pairing = std::make_unique<Pairing>(code_, nonce_, host_nonce_);
-    keys_ = pairing->keys(share, false);
-    if (!keys_) return;
-    pairing_ = std::move(pairing);
-    last_asked_us_ = 0;
-  } else if (f.step == PairingStep::welcome && keys_ && state_ == JoinState::asking) {
-    const auto connection = f.take<std::uint32_t>();
-    const auto tag = f.take<std::array<std::uint8_t, 16>>();
-    if (!f.good || !same_proof(proof(*keys_, "host"), tag)) return;
-    channel_ = std::make_unique<SecureChannel>(connection, keys_->to_host, keys_->to_guest);
-    state_ = JoinState::joined;
-    last_heard_us_ = now_us;
-    clock_ = {};
-  } else if (f.step == PairingStep::refused && state_ == JoinState::asking) {
-    const auto why = static_cast<PairingRefusal>(f.take<std::uint8_t>());
-    if (!f.good) return;
-    state_ = JoinState::refused;
-    why_ = why == PairingRefusal::wrong_code ? "the code is another"
-           : why == PairingRefusal::locked   ? "there were too many wrong codes: the host has to show a new one"
-           : why == PairingRefusal::full     ? "someone else is the trainee, or nobody else can join"
-                                             : "the host speaks another version of this protocol";
-  }
+  if (state_ != JoinState::asking) return;
+  pairing_.receive(packet, now_us);
+  if (pairing_.state() == PairingGuest::State::refused) state_ = JoinState::refused;
+  if (pairing_.state() != PairingGuest::State::joined) return;
+  const PairKeys keys = pairing_.take_keys();
+  channel_ = std::make_unique<SecureChannel>(pairing_.connection(), keys.to_host, keys.to_guest);
+  state_ = JoinState::joined;
+  last_heard_us_ = now_us;
+  clock_ = {};
 }
 
 // A host that has begun anew: nothing of before counts.
@@ -148,20 +128,10 @@ std::vector<Bytes> LiveGuest::poll(std::int64_t now_us) {
     // Dropped: the session goes on here alone, and it is asked for again.
     state_ = JoinState::asking;
     channel_.reset();
-    pairing_.reset();
-    keys_.reset();
-    nonce_ = Pairing::make_nonce();
+    pairing_.begin();
   }
-  if (state_ == JoinState::asking && now_us - last_asked_us_ >= kAskEveryUs) {
-    last_asked_us_ = now_us;
-    if (pairing_ && keys_) {
-      out.push_back(PairingPacket(PairingStep::prove).add(nonce_).add(pairing_->share()).add(proof(*keys_, "guest")).bytes);
-    } else {
-      PairingPacket ask(PairingStep::ask);
-      ask.add(nonce_).add(static_cast<std::uint8_t>(role_));
-      ask.bytes.resize(kAskBytes);
-      out.push_back(std::move(ask.bytes));
-    }
+  if (state_ == JoinState::asking) {
+    if (auto packet = pairing_.poll(now_us)) out.push_back(std::move(*packet));
   }
   if (state_ == JoinState::joined && now_us - last_sent_us_ >= kGuestSendEveryUs) {
     last_sent_us_ = now_us;

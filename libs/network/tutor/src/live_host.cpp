@@ -8,6 +8,10 @@ namespace osteo::inline network {
 namespace {
 
 constexpr std::int64_t kSendEveryUs = 4000, kGoneUs = 10'000'000;
+// Of seats: who is silent for so long may lose his; who is heard so long after another has asked is there, and no
+// packet of before is late; and how long watchers wait for a trainee that was there within the last minute.
+constexpr std::int64_t kSilentUs = 1'000'000, kSurelyUs = 200'000, kTraineeFirstUs = 2'000'000,
+                       kTraineeAwaitedUs = 60'000'000;
 constexpr std::uint64_t kWindowTicks = 4096;  // on their way to one who catches up
 constexpr std::uint64_t kOverlap = 8;         // of the newest ticks, sent again with each packet
 constexpr int kPacketsAPoll = 16;
@@ -23,7 +27,11 @@ std::uint64_t random_number() {
 }  // namespace
 
 LiveHost::LiveHost(std::string_view tidy_code, Bytes settings, std::size_t hands, std::shared_ptr<FarDevice> far)
-    : code_(tidy_code), settings_(std::move(settings)), hands_(hands), far_(std::move(far)), session_(random_number()) {}
+    : pairing_(tidy_code),
+      settings_(std::move(settings)),
+      hands_(hands),
+      far_(std::move(far)),
+      session_(random_number()) {}
 
 void LiveHost::action(const SceneAction& action) {
   const std::lock_guard lock(mutex_);
@@ -73,12 +81,12 @@ bool LiveHost::waited_for(std::int64_t now_us) const {
 
 int LiveHost::tries_left() const {
   const std::lock_guard lock(mutex_);
-  return tries_;
+  return pairing_.tries_left();
 }
 
 std::uint64_t LiveHost::refused() const {
   const std::lock_guard lock(mutex_);
-  return refused_;
+  return refused_ + pairing_.refused();
 }
 
 std::vector<PeerStatus> LiveHost::status(std::int64_t now_us) const {
@@ -92,89 +100,51 @@ std::vector<PeerStatus> LiveHost::status(std::int64_t now_us) const {
   return all;
 }
 
-void LiveHost::refuse(const UdpPeer& to, const Pairing::Nonce& nonce, std::uint8_t why) {
-  out_.push_back({to, PairingPacket(PairingStep::refused).add(nonce).add(why).bytes});
+PairingSeats::Answer LiveHost::seat(const UdpPeer& from, JoinRole role, std::int64_t proved_us, std::int64_t now_us) {
+  const auto silent = [&](const Peer& p) { return now_us - p.last_heard_us > kSilentUs; };
+  const auto surely_there = [&](const Peer& p) { return p.last_heard_us > proved_us + kSurelyUs; };
+  if (role == JoinRole::watcher && trainee_heard_us_) {
+    const std::int64_t gone_for = now_us - *trainee_heard_us_;
+    if (gone_for > kSilentUs && gone_for < kTraineeAwaitedUs && now_us - proved_us < kTraineeFirstUs)
+      return Answer::wait;
+  }
+  std::size_t others = 0, sure = 0;
+  for (const auto& p : peers_) {
+    if (p->from == from || silent(*p)) continue;
+    if (role == JoinRole::trainee && p->role == JoinRole::trainee)
+      return surely_there(*p) ? Answer::taken : Answer::wait;
+    ++others;
+    sure += surely_there(*p) ? 1 : 0;
+  }
+  if (others < kMostPeers) return Answer::free;
+  return sure < kMostPeers ? Answer::wait : Answer::taken;
 }
 
-void LiveHost::pair(const UdpPeer& from, std::span<const std::uint8_t> packet, std::int64_t now_us) {
-  PairingFields f(packet);
-  const auto nonce = f.take<Pairing::Nonce>();
-  if (!f.good || (f.step != PairingStep::ask && f.step != PairingStep::prove)) {
-    ++refused_;
-    return;
-  }
-  if (f.protocol != kTutorProtocol) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::protocol));
-  pairings_ = std::min<double>(kPairingsPerS, pairings_ + static_cast<double>(now_us - pairings_us_) * 1e-6 * kPairingsPerS);
-  pairings_us_ = now_us;
-  if (pairings_ < 1) {  // a flood: the costly part is not done more often than this
-    ++refused_;
-    return;
-  }
-  pairings_ -= 1;
-  if (tries_ <= 0) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::locked));
-  const auto known = std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) { return p.from == from && p.guest == nonce; });
-  if (f.step == PairingStep::ask) {
-    const auto role = static_cast<JoinRole>(f.take<std::uint8_t>());
-    if (!f.good || packet.size() < kAskBytes || (role != JoinRole::trainee && role != JoinRole::watcher)) {
-      ++refused_;
-      return;
-    }
-    if (known == pending_.end()) {
-      if (pending_.size() >= kMostPending) pending_.pop_front();
-      Pending p{from, role, nonce, Pairing::make_nonce(), nullptr};
-      p.pairing = std::make_unique<Pairing>(code_, p.guest, p.host);
-      pending_.push_back(std::move(p));
-    }
-    const Pending& p = known == pending_.end() ? pending_.back() : *known;
-    out_.push_back({from, PairingPacket(PairingStep::challenge).add(nonce).add(p.host).add(p.pairing->share()).bytes});
-    return;
-  }
-  const auto share = f.take<Pairing::Share>();
-  const auto tag = f.take<std::array<std::uint8_t, 16>>();
-  if (!f.good) {
-    ++refused_;
-    return;
-  }
-  if (known == pending_.end()) {
-    // The welcome was lost.
-    for (const auto& p : peers_) {
-      if (p->from == from && p->nonce == nonce)
-        out_.push_back({from, PairingPacket(PairingStep::welcome).add(nonce).add(p->channel->connection()).add(p->welcome).bytes});
-    }
-    return;
-  }
-  const Pending pending = std::move(*known);
-  pending_.erase(known);
-  const auto keys = pending.pairing->keys(share, true);
-  if (!keys || !same_proof(proof(*keys, "guest"), tag)) {
-    --tries_;
-    ++refused_;
-    return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::wrong_code));
-  }
-  tries_ = kTries;
-  // Who comes back takes his own place; so does a trainee whose link has dropped.
+std::uint32_t LiveHost::take(const UdpPeer& from, JoinRole role, const PairKeys& keys, std::int64_t now_us) {
   std::erase_if(peers_, [&](const auto& p) {
-    return p->from == from || now_us - p->last_heard_us > kGoneUs ||
-           (p->role == JoinRole::trainee && pending.role == JoinRole::trainee && now_us - p->last_heard_us > 1'000'000);
+    return p->from == from || (role == JoinRole::trainee && p->role == JoinRole::trainee);
   });
-  const bool taken = pending.role == JoinRole::trainee &&
-                     std::any_of(peers_.begin(), peers_.end(), [](const auto& p) { return p->role == JoinRole::trainee; });
-  if (taken || peers_.size() >= kMostPeers) return refuse(from, nonce, static_cast<std::uint8_t>(PairingRefusal::full));
+  if (peers_.size() >= kMostPeers) {
+    peers_.erase(std::min_element(peers_.begin(), peers_.end(),
+                                  [](const auto& a, const auto& b) { return a->last_heard_us < b->last_heard_us; }));
+  }
   auto peer = std::make_unique<Peer>();
   peer->from = from;
-  peer->role = pending.role;
-  peer->nonce = nonce;
-  peer->welcome = proof(*keys, "host");
-  peer->channel = std::make_unique<SecureChannel>(next_connection_++, keys->to_guest, keys->to_host);
+  peer->role = role;
+  const std::uint32_t connection = next_connection_++;
+  peer->channel = std::make_unique<SecureChannel>(connection, keys.to_guest, keys.to_host);
   peer->last_heard_us = now_us;
-  out_.push_back({from, PairingPacket(PairingStep::welcome).add(nonce).add(peer->channel->connection()).add(peer->welcome).bytes});
+  if (role == JoinRole::trainee) trainee_heard_us_ = now_us;
   peers_.push_back(std::move(peer));
+  return connection;
 }
 
 void LiveHost::receive(const UdpPeer& from, std::span<const std::uint8_t> packet, std::int64_t now_us) {
   const std::lock_guard lock(mutex_);
-  if (packet.size() >= 4 && std::all_of(packet.begin(), packet.begin() + 4, [](std::uint8_t b) { return b == 0; }))
-    return pair(from, packet, now_us);
+  if (packet.size() >= 4 && std::all_of(packet.begin(), packet.begin() + 4, [](std::uint8_t b) { return b == 0; })) {
+    if (auto answer = pairing_.receive(from, packet, now_us, *this)) out_.push_back({from, std::move(*answer)});
+    return;
+  }
   for (const auto& p : peers_) {
     if (p->from != from) continue;
     const auto plain = p->channel->open(packet);
@@ -188,6 +158,7 @@ void LiveHost::receive(const UdpPeer& from, std::span<const std::uint8_t> packet
 
 void LiveHost::hear(Peer& peer, const HandPacket& p, std::int64_t now_us) {
   peer.last_heard_us = now_us;
+  if (peer.role == JoinRole::trainee) trainee_heard_us_ = now_us;
   peer.clock.heard(p.times, now_us);
   const std::uint64_t ticks = log_.size() / hands_;
   if (p.next_tick <= ticks) {

@@ -113,8 +113,14 @@ SessionHeader LiveSeat::wait_for_session(double most_s, const Context& context) 
       if (!guest_.settings().empty()) return settings_of(guest_.settings());
     }
     context.check_cancelled();
-    if (steady_us() - begin > static_cast<std::int64_t>(most_s * 1e6))
+    if (steady_us() - begin > static_cast<std::int64_t>(most_s * 1e6)) {
+      const std::lock_guard lock(mutex_);
+      if (guest_.answered())
+        throw Error(ExitCode::failed,
+                    "the host at " + udp_name(options_.host) + " answers, but too little of it comes through",
+                    "a bad line, or somebody floods the host: try again");
       throw Error(ExitCode::failed, "nobody answers at " + udp_name(options_.host), "look at address, port and firewall");
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }

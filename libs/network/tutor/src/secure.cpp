@@ -29,6 +29,26 @@ void add(crypto_generichash_state& state, std::string_view text) {
 
 }  // namespace
 
+PairKeys::~PairKeys() {
+  ::sodium_memzero(to_host.data(), to_host.size());
+  ::sodium_memzero(to_guest.data(), to_guest.size());
+  ::sodium_memzero(confirm.data(), confirm.size());
+}
+
+void wipe(std::string& secret) noexcept {
+  ::sodium_memzero(secret.data(), secret.size());
+  secret.clear();
+}
+
+Pairing::~Pairing() {
+  ::sodium_memzero(secret_.data(), secret_.size());
+}
+
+SecureChannel::~SecureChannel() {
+  ::sodium_memzero(send_.data(), send_.size());
+  ::sodium_memzero(receive_.data(), receive_.size());
+}
+
 std::string make_pairing_code() {
   need_sodium();
   std::string code;
@@ -73,6 +93,10 @@ Pairing::Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& ho
   do {
     ::crypto_core_ristretto255_scalar_random(secret_.data());
   } while (::crypto_scalarmult_ristretto255(mine_.data(), secret_.data(), generator.data()) != 0);
+  // From each of them the code could be tried out without talking to anybody.
+  ::sodium_memzero(&state, sizeof state);
+  ::sodium_memzero(hash.data(), hash.size());
+  ::sodium_memzero(generator.data(), generator.size());
 }
 
 std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const {
@@ -82,17 +106,19 @@ std::optional<PairKeys> Pairing::keys(const Share& theirs, bool i_am_host) const
   PairKeys keys;
   const auto derive = [&](std::string_view label, std::array<std::uint8_t, 32>& out) {
     crypto_generichash_state state;
-    ::crypto_generichash_init(&state, shared.data(), shared.size(), out.size());
+    ::crypto_generichash_init(&state, shared.data(), shared.size(), out.size());  // its first block holds the key
     add(state, label);
     add(state, guest_);
     add(state, host_);
     add(state, i_am_host ? theirs : mine_);
     add(state, i_am_host ? mine_ : theirs);
     ::crypto_generichash_final(&state, out.data(), out.size());
+    ::sodium_memzero(&state, sizeof state);
   };
   derive("osteotome tutor 1, to host", keys.to_host);
   derive("osteotome tutor 1, to guest", keys.to_guest);
   derive("osteotome tutor 1, confirm", keys.confirm);
+  ::sodium_memzero(shared.data(), shared.size());
   return keys;
 }
 

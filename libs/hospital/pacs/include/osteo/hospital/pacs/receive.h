@@ -15,6 +15,9 @@
 
 namespace osteo::inline hospital {
 
+/// Slower than this an object does not come for long.
+inline constexpr double kReceiveBytesPerS = 100'000;
+
 struct ReceiveOptions {
   std::string ae = "OSTEOTOME";       ///< a peer must call us so
   std::string address = "127.0.0.1";  ///< IPv4 to listen on
@@ -24,10 +27,11 @@ struct ReceiveOptions {
   DicomTls tls;                 ///< when `ca` is named, all three are needed, and who has no certificate from it is not let in
   int most_associations = 20;   ///< at once; more are refused ("local limit exceeded")
   double object_gb = 2;         ///< a larger object is refused
-  double folder_gb = 100;       ///< all of the folder; beyond it objects are refused (A700, out of resources)
+  double folder_gb = 100;       ///< all series that are there now; beyond it objects are refused (A700)
   double keep_free_gb = 1;      ///< of the disk
   double memory_mb = 512;       ///< of an association's process
-  double timeout_s = 30;        ///< for each message of a peer
+  double timeout_s = 30;  ///< for a peer to say something, and for a message to be whole: an object's may take a second
+                          ///< more for each kReceiveBytesPerS of it that have come
   double association_s = 3600;  ///< longest
   double quiet_s = 30;          ///< a series is closed when nothing of it came for so long
 };
@@ -35,7 +39,8 @@ struct ReceiveOptions {
 struct ReceiveCounters {
   std::uint64_t associations = 0, refused_associations = 0, died = 0;  ///< died: processes ended by a limit or a fault
   std::uint64_t stored = 0, again = 0, refused = 0, bytes = 0;         ///< again: had the same object already
-  std::uint64_t closed = 0;                                            ///< series
+  std::uint64_t timed_out = 0;         ///< associations ended for timeout_s or association_s
+  std::uint64_t closed = 0, gone = 0;  ///< series; those moved or deleted before they were closed
   [[nodiscard]] bool operator==(const ReceiveCounters&) const = default;
 };
 
@@ -51,9 +56,10 @@ struct ReceiveEvents {
   std::function<void(const ReceiveCounters&)> counters;  ///< at most once a second, when they changed, and at the end
 };
 
-/// Serves until the context is cancelled (then series still open are left as they are, and closed at the next start: what is in the folder
-/// and has no CLOSED file counts as having just come). Must be called while the process has one thread. Errors: usage, cannot_write,
-/// failed (port taken).
+/// Serves until the context is cancelled (then series still open are left as they are, and closed at the next start:
+/// what is in the folder and has no CLOSED file counts as having just come). Whatever is moved, deleted or filled in
+/// the folder meanwhile is warned of once and ends nothing. Must be called while the process has one thread. Errors:
+/// usage, cannot_write (also where another node receives into the folder), failed (port taken).
 void receive_objects(const fs::path& folder, const ReceiveOptions& options, const ReceiveEvents& events, const Context& context);
 
 /// What a monitoring system reads (Prometheus' text form, version 0.0.4).

@@ -18,6 +18,7 @@
 #include "osteo/core/rt/seqlock.h"
 #include "osteo/session/scene/reader.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/network/tutor/pairing.h"
 #include "osteo/network/tutor/secure.h"
 #include "osteo/network/tutor/wire.h"
 
@@ -121,8 +122,6 @@ inline constexpr double kFarBrake = 12, kFarMassKg = 0.25;
 /// Adds a change of bone to a running hash of all of them.
 [[nodiscard]] std::uint64_t mixed(std::uint64_t hash, std::uint64_t tick, std::span<const VoxelChange> changes) noexcept;
 
-enum class JoinRole : std::uint8_t { trainee = 1, watcher = 2 };
-
 struct OutgoingPacket {
   UdpPeer to;  ///< as receive() was told
   Bytes bytes;
@@ -139,13 +138,18 @@ struct PeerStatus {
   std::uint64_t marks_same = 0;          ///< compared, and the same
 };
 
-/// The side that runs the session. As a reader of its stream it keeps all ticks, in 28 bytes a hand (kMostTicks: half an hour at 1 kHz;
-/// then who is further behind is let go), and gives them to whoever has joined. receive(), poll() and status() from one thread each; memory
-/// is bounded whatever comes in.
-class LiveHost final : public Reader {
+/// The side that runs the session. As a reader of its stream it keeps all ticks, in 28 bytes a hand, and gives them to
+/// whoever has joined. After kMostTicks (half an hour at 1 kHz) there is no room for more: lost(), all who have joined
+/// are told that there is no more of it, and each keeps the copy that it has. receive(), poll() and status() from one
+/// thread each; memory is bounded whatever comes in.
+///
+/// Who joins is found out by PairingHost. Seats: one trainee and at most kMostPeers in all. Whoever comes back from the
+/// same address takes its own seat again; one that has been silent for a second gives its seat to who has proved to
+/// know the code, and whether it is silent is waited for. While a trainee's seat waits for one that has dropped,
+/// watchers are let in 2 s later: the trainee comes first.
+class LiveHost final : public Reader, private PairingSeats {
  public:
-  static constexpr std::size_t kMostPeers = 9, kMostPending = 4, kMostTicks = 1'800'000;
-  static constexpr int kTries = 3, kPairingsPerS = 20;
+  static constexpr std::size_t kMostPeers = 9, kMostTicks = 1'800'000;
 
   /// `settings`: what a copy needs before the first tick. `hands` of the session.
   LiveHost(std::string_view tidy_code, Bytes settings, std::size_t hands, std::shared_ptr<FarDevice> far);
@@ -170,8 +174,6 @@ class LiveHost final : public Reader {
   struct Peer {
     UdpPeer from;
     JoinRole role{};
-    Pairing::Nonce nonce{};
-    std::array<std::uint8_t, 16> welcome{};
     std::unique_ptr<SecureChannel> channel;
     ClockSync clock;
     std::int64_t last_heard_us = 0, last_sent_us = 0, last_moved_us = 0;
@@ -181,29 +183,21 @@ class LiveHost final : public Reader {
     bool ready = false;
     std::uint64_t differs = 0, compared = 0, same = 0;
   };
-  struct Pending {
-    UdpPeer from;
-    JoinRole role{};
-    Pairing::Nonce guest{}, host{};
-    std::unique_ptr<Pairing> pairing;
-  };
-  void pair(const UdpPeer& from, std::span<const std::uint8_t> packet, std::int64_t now_us);
+  [[nodiscard]] Answer seat(const UdpPeer& from, JoinRole role, std::int64_t proved_us, std::int64_t now_us) override;
+  [[nodiscard]] std::uint32_t take(const UdpPeer& from, JoinRole role, const PairKeys& keys,
+                                   std::int64_t now_us) override;
   void hear(Peer& peer, const HandPacket& p, std::int64_t now_us);
   [[nodiscard]] LogPacket log_from(std::uint64_t tick) const;
-  void refuse(const UdpPeer& to, const Pairing::Nonce& nonce, std::uint8_t why);
 
   mutable std::mutex mutex_;
-  const std::string code_;
+  PairingHost pairing_;
   const Bytes settings_;
   const std::size_t hands_;
   std::shared_ptr<FarDevice> far_;
   std::vector<std::unique_ptr<Peer>> peers_;
-  std::deque<Pending> pending_;
   std::vector<OutgoingPacket> out_;
-  int tries_ = kTries;
   std::uint32_t next_connection_ = 1;
-  double pairings_ = kPairingsPerS;
-  std::int64_t pairings_us_ = 0;
+  std::optional<std::int64_t> trainee_heard_us_;  // one that had joined
   std::uint64_t refused_ = 0;
   std::vector<DeviceSample> log_;  // of each tick all hands
   std::deque<SceneAction> actions_;
@@ -234,7 +228,8 @@ class LiveGuest {
   void put(const FarSample& own) noexcept { own_.push(own); }
 
   [[nodiscard]] JoinState state() const { return state_; }
-  [[nodiscard]] const std::string& why() const { return why_; }
+  [[nodiscard]] const std::string& why() const { return pairing_.why(); }  ///< refused: in words
+  [[nodiscard]] bool answered() const { return pairing_.answered(); }      ///< a host has been heard of, joined or not
   [[nodiscard]] const ClockSync& clock() const { return clock_; }
   /// Whole settings of the session; empty until they are here.
   [[nodiscard]] const Bytes& settings() const { return settings_whole_ ? settings_ : none_; }
@@ -267,17 +262,13 @@ class LiveGuest {
   void hear(const BlobPacket& p);
   void take_session(std::uint64_t session);
   static constexpr std::size_t kMostWaiting = 8192;
-  const std::string code_;
   const JoinRole role_;
   std::shared_ptr<FarDevice> host_hand_;
   JoinState state_ = JoinState::asking;
-  std::string why_;
-  Pairing::Nonce nonce_{}, host_nonce_{};
-  std::unique_ptr<Pairing> pairing_;
-  std::optional<PairKeys> keys_;
+  PairingGuest pairing_;
   std::unique_ptr<SecureChannel> channel_;
   ClockSync clock_;
-  std::int64_t last_asked_us_ = 0, last_sent_us_ = 0, last_heard_us_ = 0;
+  std::int64_t last_sent_us_ = 0, last_heard_us_ = 0;
   Bytes settings_, none_;
   bool settings_whole_ = false;
   std::map<std::uint64_t, LiveTick> waiting_;

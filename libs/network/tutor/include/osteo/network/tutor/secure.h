@@ -17,14 +17,24 @@ namespace osteo::inline network {
 /// Small letters, blanks and dashes are as good; empty: it is none.
 [[nodiscard]] std::string tidy_code(std::string_view typed);
 
-/// What both have after pairing.
+/// What both have after pairing. Each copy is wiped as it goes.
 struct PairKeys {
   std::array<std::uint8_t, 32> to_host{}, to_guest{}, confirm{};
+  ~PairKeys();
 };
+/// Overwrites a secret text, and empties it.
+void wipe(std::string& secret) noexcept;
 
-/// One side of CPace on ristretto255 (a balanced PAKE: draft-irtf-cfrg-cpace): the code maps to a generator, each side sends a random
-/// multiple of it. Who listens learns nothing to try codes on; who takes part can try one code a run, and the host counts runs (three). Not
-/// withstood: someone who reads the code.
+/// One side of CPace on ristretto255 (a balanced PAKE: draft-irtf-cfrg-cpace): the code maps to a generator, each side
+/// sends a random multiple of it. Who listens learns nothing to try codes on; who takes part can try one code a run,
+/// and the host counts runs (three). Not withstood: someone who reads the code. The secret is wiped at the end.
+///
+/// Conformance: the protocol is CPace's (map, share, key, confirmation), its encoding is not the draft's
+/// CPACE-RISTR255-SHA512. Here the generator is the ristretto255 map of BLAKE2b-512 over "osteotome tutor 1,
+/// generator", code and both nonces, each text with its length; there it is that of SHA-512 over "CPaceRistretto255",
+/// padding, password, channel and session id. Keys are BLAKE2b over labels, nonces and shares, not the draft's ISK. So
+/// none of its published test vectors of generators or keys can be run against this; the group's operations behind them
+/// are libsodium's (RFC 9496), and a neutral or invalid share is refused as the draft demands.
 class Pairing {
  public:
   static constexpr std::size_t kNonce = 16, kShare = 32;
@@ -32,6 +42,7 @@ class Pairing {
   using Share = std::array<std::uint8_t, kShare>;
   [[nodiscard]] static Nonce make_nonce();
   Pairing(std::string_view tidy_code, const Nonce& guest, const Nonce& host);
+  ~Pairing();
   [[nodiscard]] const Share& share() const { return mine_; }
   /// Nothing where the other's share is no point, or the neutral one.
   [[nodiscard]] std::optional<PairKeys> keys(const Share& theirs, bool i_am_host) const;
@@ -42,13 +53,14 @@ class Pairing {
   Share mine_{};
 };
 
-/// Authenticated encryption of packets in one direction each (ChaCha20-Poly1305, the counter is the nonce). A packet: connection (4 bytes),
-/// counter (8), ciphertext, tag (16).
+/// Authenticated encryption of packets in one direction each (ChaCha20-Poly1305, the counter is the nonce). A packet:
+/// connection (4 bytes), counter (8), ciphertext, tag (16). Both keys are wiped at the end.
 class SecureChannel {
  public:
   static constexpr std::size_t kOverhead = 28;
   SecureChannel(std::uint32_t connection, const std::array<std::uint8_t, 32>& send, const std::array<std::uint8_t, 32>& receive)
       : connection_(connection), send_(send), receive_(receive) {}
+  ~SecureChannel();
   [[nodiscard]] Bytes seal(std::span<const std::uint8_t> plain);
   /// Nothing for what was not sealed by the other side, was heard before, or is older than kWindow packets.
   [[nodiscard]] std::optional<Bytes> open(std::span<const std::uint8_t> packet);
