@@ -35,7 +35,7 @@ extern char** environ;
 namespace osteo::inline hospital {
 namespace {
 
-using State = ServerFinding::State;
+using FindingState = ServerFinding::State;
 using Findings = std::vector<ServerFinding>;
 
 constexpr double kRoomGb = 20;                  // a day of scans and cases: less is worth a word
@@ -94,39 +94,39 @@ fs::path there_above(fs::path folder) {
 }
 
 void check_folder(Findings& all, const std::string& what, const fs::path& folder, double keep_free_gb, bool of_patients) {
-  const auto say = [&](State state, const std::string& says, const std::string& advice) { all.push_back({what, state, says, advice}); };
+  const auto say = [&](FindingState state, const std::string& says, const std::string& advice) { all.push_back({what, state, says, advice}); };
   std::error_code error;
   const fs::path above = there_above(folder);
   const bool there = fs::exists(folder, error);
   const std::string name = in_quotes(folder);
-  if (!fs::is_directory(above, error)) return say(State::bad, in_quotes(above) + " is no folder", "another folder, or move that file away");
+  if (!fs::is_directory(above, error)) return say(FindingState::bad, in_quotes(above) + " is no folder", "another folder, or move that file away");
   double apart_s = 0;
   if (const std::string why = try_to_write(above, apart_s); !why.empty())
-    return say(State::bad, user() + " cannot write into " + in_quotes(above) + ": " + why,
+    return say(FindingState::bad, user() + " cannot write into " + in_quotes(above) + ": " + why,
                why == std::strerror(ENOSPC) ? "make room there"
                                             : "let " + user() + " write there (chown, chmod, mount); run this as the services' user");
   struct statvfs disk {};
   struct stat s {};
   if (::statvfs(above.c_str(), &disk) != 0 || ::stat(above.c_str(), &s) != 0)
-    return say(State::bad, name + ": " + reason(), "another folder");
+    return say(FindingState::bad, name + ": " + reason(), "another folder");
   const double free_gb = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize) / 1e9;
   const std::string room = gigabytes(free_gb) + " free";
   if (free_gb < keep_free_gb)
-    return say(State::bad,
+    return say(FindingState::bad,
                name + ": " + room + ", and " + gigabytes(keep_free_gb) + " are to stay free: nothing would be taken in or begun",
                "make room, or a smaller --keep-free-gb");
   if (disk.f_files > 0 && disk.f_favail < kFewFiles)
-    return say(State::bad, name + ": room for " + std::to_string(disk.f_favail) + " files more",
+    return say(FindingState::bad, name + ": room for " + std::to_string(disk.f_favail) + " files more",
                "make room: the disk's inodes are used up");
   if (of_patients && there && (s.st_mode & 07) != 0)
-    return say(State::care, name + ": " + room + "; everybody on this machine may look into it, and it names patients",
+    return say(FindingState::care, name + ": " + room + "; everybody on this machine may look into it, and it names patients",
                "chmod o= " + folder.string());
   if (std::abs(apart_s) > kClocksApart)
-    return say(State::care,
+    return say(FindingState::care,
                name + ": its clock is " + format_number(std::abs(apart_s)) + " s " + (apart_s > 0 ? "before" : "behind") + " ours",
                "let both machines keep time by NTP");
-  if (free_gb < kRoomGb) return say(State::care, name + ": " + room, "a day of scans may need more than " + gigabytes(kRoomGb));
-  say(State::good, name + ": " + room + (there ? "" : "; it will be made"), {});
+  if (free_gb < kRoomGb) return say(FindingState::care, name + ": " + room, "a day of scans may need more than " + gigabytes(kRoomGb));
+  say(FindingState::good, name + ": " + room + (there ? "" : "; it will be made"), {});
 }
 
 // What listens at a TCP port of this machine, as far as this user may see.
@@ -165,14 +165,14 @@ std::string listener(int port) {
 
 void check_port(Findings& all, const ServerSetup& s) {
   const std::string where = s.bind + ":" + std::to_string(s.port);
-  const auto say = [&](State state, const std::string& says, const std::string& advice = {}) {
+  const auto say = [&](FindingState state, const std::string& says, const std::string& advice = {}) {
     all.push_back({"port", state, says, advice});
   };
   sockaddr_in at{};
   at.sin_family = AF_INET;
   at.sin_port = htons(static_cast<std::uint16_t>(s.port));
   if (::inet_pton(AF_INET, s.bind.c_str(), &at.sin_addr) != 1)
-    return say(State::bad, in_quotes(s.bind) + " is no IPv4 address", "127.0.0.1 for this machine alone, 0.0.0.0 for every network");
+    return say(FindingState::bad, in_quotes(s.bind) + " is no IPv4 address", "127.0.0.1 for this machine alone, 0.0.0.0 for every network");
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int on = 1;
   ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -181,19 +181,19 @@ void check_port(Findings& all, const ServerSetup& s) {
   if (fd >= 0) ::close(fd);
   if (!taken) {
     if (s.bind != "127.0.0.1" && s.tls.ca.empty())
-      return say(State::care, where + " is free; what comes in there is not encrypted",
+      return say(FindingState::care, where + " is free; what comes in there is not encrypted",
                  "--tls-ca, --tls-certificate and --tls-key, or a tunnel");
-    return say(State::good, where + " is free");
+    return say(FindingState::good, where + " is free");
   }
   if (why == EADDRINUSE) {
     const std::string who = listener(s.port);
-    if (who.starts_with("osteo ")) return say(State::good, where + ": " + who + " listens");
-    return say(State::bad, where + " is taken by " + (who.empty() ? "what " + user() + " may not see" : who),
+    if (who.starts_with("osteo ")) return say(FindingState::good, where + ": " + who + " listens");
+    return say(FindingState::bad, where + " is taken by " + (who.empty() ? "what " + user() + " may not see" : who),
                "--port another, or stop what listens there");
   }
-  if (why == EACCES) return say(State::bad, where + ": " + user() + " may not listen there", "a port above 1023: the units have no rights");
-  if (why == EADDRNOTAVAIL) return say(State::bad, where + " is no address of this machine", "'ip address' lists those that are");
-  say(State::bad, where + ": " + std::strerror(why), "--bind and --port another");
+  if (why == EACCES) return say(FindingState::bad, where + ": " + user() + " may not listen there", "a port above 1023: the units have no rights");
+  if (why == EADDRNOTAVAIL) return say(FindingState::bad, where + " is no address of this machine", "'ip address' lists those that are");
+  say(FindingState::bad, where + ": " + std::strerror(why), "--bind and --port another");
 }
 
 // Runs `check` and says what it throws.
@@ -201,7 +201,7 @@ template <class F>
 void try_to(Findings& all, const std::string& what, const std::string& good, const F& check) {
   try {
     check();
-    all.push_back({what, State::good, good, {}});
+    all.push_back({what, FindingState::good, good, {}});
   } catch (const Error& e) {
     all.push_back(bad_finding(what, e));
   }
@@ -238,13 +238,13 @@ void check_memory(Findings& all, const ServerSetup& s) {
   const std::string want =
       "; " + std::to_string(s.jobs) + (s.jobs == 1 ? " case may take " : " cases at a time may take ") + gigabytes(wanted_mb / 1e3);
   if (total_mb > 0 && wanted_mb > total_mb)
-    all.push_back({"machine", State::bad, there + want, "fewer --jobs, less --memory-mb, or more memory"});
+    all.push_back({"machine", FindingState::bad, there + want, "fewer --jobs, less --memory-mb, or more memory"});
   else if (total_mb > 0 && wanted_mb > available_mb)
-    all.push_back({"machine", State::care, there + want, "fewer --jobs, or end what else runs here"});
+    all.push_back({"machine", FindingState::care, there + want, "fewer --jobs, or end what else runs here"});
   else if (static_cast<unsigned>(s.jobs) > cores)
-    all.push_back({"machine", State::care, there + want, "no more --jobs than cores"});
+    all.push_back({"machine", FindingState::care, there + want, "no more --jobs than cores"});
   else
-    all.push_back({"machine", State::good, there + want, {}});
+    all.push_back({"machine", FindingState::good, there + want, {}});
 }
 
 void check_clock(Findings& all) {
@@ -255,11 +255,11 @@ void check_clock(Findings& all) {
   timex t{};
   const int kept = ::adjtimex(&t);
   if (now < kMadeAfter)
-    all.push_back({"clock", State::bad, std::string("it says ") + text.data(), "set it: certificates and records go by it"});
+    all.push_back({"clock", FindingState::bad, std::string("it says ") + text.data(), "set it: certificates and records go by it"});
   else if (kept == TIME_ERROR || (t.status & STA_UNSYNC) != 0)
-    all.push_back({"clock", State::care, std::string(text.data()) + "; nothing keeps it", "timedatectl set-ntp true (or chrony)"});
+    all.push_back({"clock", FindingState::care, std::string(text.data()) + "; nothing keeps it", "timedatectl set-ntp true (or chrony)"});
   else
-    all.push_back({"clock", State::good, std::string(text.data()) + ", kept", {}});
+    all.push_back({"clock", FindingState::good, std::string(text.data()) + ", kept", {}});
 }
 
 bool in_path(const std::string& program) {
@@ -319,17 +319,17 @@ bool check_unit(Findings& all, const std::string& unit) {
   const bool starts = value("UnitFileState").starts_with("enabled");
   if (value("LoadState") != "loaded")
     all.push_back(
-        {unit, State::none, "not installed (" + value("LoadState") + ")", "it comes with the package osteo, for the prefix /usr"});
+        {unit, FindingState::none, "not installed (" + value("LoadState") + ")", "it comes with the package osteo, for the prefix /usr"});
   else if (active == "failed")
-    all.push_back({unit, State::bad, "has failed: " + value("Result"), "journalctl -u " + unit});
+    all.push_back({unit, FindingState::bad, "has failed: " + value("Result"), "journalctl -u " + unit});
   else if (active != "active" && active != "activating")
-    all.push_back({unit, State::care, "does not run (" + active + ")", "systemctl enable --now " + unit});
+    all.push_back({unit, FindingState::care, "does not run (" + active + ")", "systemctl enable --now " + unit});
   else if (active == "activating")
-    all.push_back({unit, State::care, "is being started, perhaps again and again", "journalctl -u " + unit});
+    all.push_back({unit, FindingState::care, "is being started, perhaps again and again", "journalctl -u " + unit});
   else if (!starts)
-    all.push_back({unit, State::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
+    all.push_back({unit, FindingState::care, "runs, but not after the next start of the machine", "systemctl enable " + unit});
   else
-    all.push_back({unit, State::good, "runs", {}});
+    all.push_back({unit, FindingState::good, "runs", {}});
   return true;
 }
 
@@ -337,7 +337,7 @@ void check_units(Findings& all) {
   for (const std::string unit : kUnits) {
     if (!in_path("systemctl") || !check_unit(all, unit)) {
       all.push_back(
-          {"systemd", State::none, "no systemd runs here", "start 'osteo receive' and 'osteo watch' by what starts services here"});
+          {"systemd", FindingState::none, "no systemd runs here", "start 'osteo receive' and 'osteo watch' by what starts services here"});
       return;
     }
   }
@@ -354,18 +354,18 @@ void check_cluster(Findings& all) {
   std::string missing, there;
   for (const char* const program : {"snakemake", "sbatch", "scontrol"}) (in_path(program) ? there : missing) += std::string(" ") + program;
   if (there.empty())
-    all.push_back({"Slurm", State::none, "not here: 'osteo batch' runs cases on this machine alone", {}});
+    all.push_back({"Slurm", FindingState::none, "not here: 'osteo batch' runs cases on this machine alone", {}});
   else if (!missing.empty())
-    all.push_back({"Slurm", State::none, "there is" + there + ", but not" + missing, "cases over a cluster want all three"});
+    all.push_back({"Slurm", FindingState::none, "there is" + there + ", but not" + missing, "cases over a cluster want all three"});
   else
-    all.push_back({"Slurm", State::good, "there are" + there, {}});
+    all.push_back({"Slurm", FindingState::good, "there are" + there, {}});
 }
 
 }  // namespace
 
 ServerFinding bad_finding(const std::string& what, const Error& error) {
   const bool input = error.code() == ExitCode::no_input || error.code() == ExitCode::cannot_read;
-  return {what, State::bad, error.what(),
+  return {what, FindingState::bad, error.what(),
           !error.advice().empty() ? error.advice()
           : input                 ? "name a file that is there and that " + user() + " may read"
                                   : "mend it: what needs it would stop with this"};
@@ -373,13 +373,13 @@ ServerFinding bad_finding(const std::string& what, const Error& error) {
 
 std::string_view state_name(ServerFinding::State state) {
   switch (state) {
-    case State::good:
+    case FindingState::good:
       return "good";
-    case State::none:
+    case FindingState::none:
       return "none";
-    case State::care:
+    case FindingState::care:
       return "care";
-    case State::bad:
+    case FindingState::bad:
       return "bad";
   }
   return "bad";
@@ -410,9 +410,9 @@ std::vector<ServerFinding> check_server(const ServerSetup& s) {
     // It is replaced, never written into: what counts is its folder.
     const fs::path folder = fs::absolute(file, error).parent_path();
     if (fs::is_directory(file, error))
-      all.push_back({"counters", State::bad, in_quotes(file) + " is a folder", "the name of a file"});
+      all.push_back({"counters", FindingState::bad, in_quotes(file) + " is a folder", "the name of a file"});
     else if (!fs::exists(folder, error))
-      all.push_back({"counters", State::bad, in_quotes(folder) + " is not there", "mkdir -p " + folder.string()});
+      all.push_back({"counters", FindingState::bad, in_quotes(folder) + " is not there", "mkdir -p " + folder.string()});
     else
       check_folder(all, "counters", folder, 0, false);
   }
