@@ -72,6 +72,84 @@ TEST(Guide, TheDeviceBearsNoMoreThanHalfAWall) {
   EXPECT_EQ(law_of(g, weak).stiffness_n_per_mm(), safe_stiffness_n_per_mm(weak, 1, 1e-3) / 2);
 }
 
+// All that leads a hand together is within the limit, and what is forwarded gives way as the hand goes off: wherever it is, the sum leads
+// back beyond kNearMm, whatever the leader pressed with.
+TEST(Guide, TheLeadersForceCannotCarryTheHandOff) {
+  HandGuide g;
+  g.stiffness_n_per_mm = 1;
+  g.forward = 1;
+  g.most_n = 3;
+  for (const DeviceTraits& device : {kFirm, DeviceTraits{}, DeviceTraits{.damping_n_s_per_m = 1, .delay_s = 0.001}}) {
+    for (const double pressed : {1.0, 4.0, 8.0}) {
+      Vec3 before;
+      for (double off = 0; off < 30; off += 0.05) {
+        GuideLaw law = law_of(g, device);
+        Vec3 f;
+        for (int t = 0; t < 80; ++t) f = law.step({0, 0, off}, {}, leader_at({}), {0, 0, pressed}, 1e-3);
+        EXPECT_LE(length(f), g.most_n + 1e-9);
+        if (off > GuideLaw::kNearMm) {
+          EXPECT_LT(f.z, 0) << off << " " << pressed;
+        }
+        // No steeper than the spring and as much again.
+        if (off > 0) {
+          EXPECT_LT(length(f - before), 2 * safe_stiffness_n_per_mm(device, 1, 1e-3) / 2 * 0.05 + 1e-9) << off;
+        }
+        before = f;
+      }
+    }
+  }
+}
+
+// A hand of 0.1 kg that gives way, on three arms, is shown strokes of up to 4 mm/s that the leader pressed on with up to 8 N.
+TEST(Guide, AHandThatIsShownFollowsWithinAMillimetre) {
+  struct Arm {
+    double damping, delay_s, encoder_mm;
+  };
+  for (const Arm& arm : {Arm{1, 0, 0}, {1, 0.001, 0}, {3, 0, 0.03}}) {
+    for (const double pressed : {2.0, 5.0, 8.0}) {
+      for (const double grip : {0.1, 0.25, 0.5}) {
+        SimulatedDeviceParams p;
+        p.damping_n_s_per_m = arm.damping;
+        p.delay_s = arm.delay_s;
+        p.encoder_mm = arm.encoder_mm;
+        p.hand_damping_n_s_per_m = 100 * grip;
+        SimulatedDevice hand(p, {});
+        HandGuide g;
+        g.stiffness_n_per_mm = 1;
+        g.damping_n_s_per_m = 2;
+        g.forward = 1;
+        g.most_n = 3;
+        g.own_contact = false;
+        GuideLaw law = law_of(g, hand.traits());
+        Guard guard({}, hand.traits());
+        Vec3 force, place;
+        double squares = 0, most = 0;
+        int n = 0;
+        for (std::uint64_t t = 0; t < 4000; ++t) {
+          const double s = static_cast<double>(t) * 1e-3;
+          const Vec3 way{4 * std::sin(s), 0, -0.3 * s};
+          const Vec3 at = from_floats(hand.read(t, 1e-3, force).position_mm);
+          place += (at - place) * 0.01;
+          hand.set_hand({}, place, grip);
+          // Pressed in strokes of its own, as a hand does.
+          const Vec3 felt{0.15 * pressed, 0, pressed * (0.6 + 0.4 * std::sin(9 * s))};
+          Guard::Input in;
+          in.position_mm = at;
+          in.effects_n = law.step(at, {}, leader_at(way), felt, 1e-3);
+          force = guard.limit(in, 1e-3).force_n;
+          if (t < 500) continue;
+          const double e = length(at - way);
+          squares += e * e;
+          most = std::max(most, e);
+          ++n;
+        }
+        EXPECT_LT(std::sqrt(squares / n), 1) << arm.damping << " " << arm.delay_s << " " << pressed << " N, grip " << grip;
+        EXPECT_LT(most, 2) << pressed << " N, grip " << grip;
+      }
+    }
+  }
+}
+
 TEST(Guide, PushingAwayHasItsOwnLimits) {
   HandGuide g;
   g.stiffness_n_per_mm = -1;

@@ -88,7 +88,7 @@ TEST(Removal, AFastHandLeavesBoneAndTakesItTheNextTime) {
   const double once = removed_mm3(path, bone, ContactMethod::overlap, 1000);
   EXPECT_LT(once, 0.7 * swept);
   auto again = block(0.5, {});
-  for (int n = 0; n < 40; ++n) path.legs.push_back({path.legs[1].to_mm + Vec3{n % 2 == 0 ? -4.06 : 0, 0, 0}, 40});
+  for (int n = 0; n < 80; ++n) path.legs.push_back({path.legs[1].to_mm + Vec3{n % 2 == 0 ? -4.06 : 0, 0, 0}, 40});
   const double ratio = removed_mm3(path, again, ContactMethod::overlap, 1000) / swept;
   EXPECT_LT(ratio, kMost);
   EXPECT_GT(ratio, kLeast);

@@ -43,24 +43,30 @@ std::string too_small_for_voxels(const Burr& burr, double spacing_mm) {
 }
 
 Removal::Removal(const BrickGrid& bone)
-    : grains_(bone), reached_(most_hits(bone.frame().spacing_mm.x) + 512), changes_(most_hits(bone.frame().spacing_mm.x)) {}
+    : grains_(bone),
+      reached_(most_hits(bone.frame().spacing_mm.x) + 512),
+      weights_(reached_.size()),
+      changes_(most_hits(bone.frame().spacing_mm.x)) {}
 
 std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm,
                                              double dt_s, const Hardness* hardness, double& removed_mm3, std::size_t hand) noexcept {
   removed_mm3 = 0;
-  if (cut.hits.empty() || !(cut.weight_mm3 > 0) || !(cut.bone_mm3 > 0) || !(force_n > 0)) return {};
+  if (cut.hits.empty()) return {};
   grains_.place(bone, burr.head(), cut.at_mm, cut.axis, cut.in_turns, hand);
-  double listed = 0, resisted = 0;
+  double may_go = 0, listed = 0, resisted = 0;
   for (std::size_t i = 0; i < cut.hits.size(); ++i) {
     const Hit& h = cut.hits[i];
-    reached_[i] = bone.value(h.voxel) - grains_.reach(bone, h.voxel);
+    const float density = bone.value(h.voxel);
+    reached_[i] = density - grains_.reach(bone, h.voxel, h.share);
     if (!(reached_[i] > 0)) continue;
-    const auto w = static_cast<double>(h.weight);
+    const double here = static_cast<double>(std::min(density * h.share, reached_[i])), w = here * static_cast<double>(h.efficiency);
+    may_go += here;
     listed += w;
-    resisted += hardness != nullptr ? w / static_cast<double>(hardness->at(h.voxel)) : w;
+    weights_[i] = hardness != nullptr ? w / static_cast<double>(hardness->at(h.voxel)) : w;
+    resisted += weights_[i];
   }
-  if (!(resisted > 0)) return {};
-  const double efficiency = cut.weight_mm3 / cut.bone_mm3, ease = resisted / listed;
+  if (!(resisted > 0) || !(force_n > 0)) return {};
+  const double efficiency = listed / may_go, ease = resisted / listed;
   const double full = burr.rate_mm3_per_s_per_n * speed_rpm / Burr::kNominalRpm * dt_s;
   const double wanted = full * efficiency * force_n * ease + carry_mm3_[hand];
   const double voxel_mm3 = bone.frame().voxel_volume_mm3();
@@ -68,8 +74,7 @@ std::span<const VoxelChange> Removal::remove(BrickGrid& bone, const Cut& cut, co
   for (std::size_t i = 0; i < cut.hits.size() && changed < changes_.size(); ++i) {
     if (!(reached_[i] > 0)) continue;
     const Hit& h = cut.hits[i];
-    const double ease_here = hardness != nullptr ? 1 / static_cast<double>(hardness->at(h.voxel)) : 1;
-    const double share = wanted * static_cast<double>(h.weight) * ease_here / resisted / voxel_mm3;
+    const double share = wanted * weights_[i] / resisted / voxel_mm3;
     const float before = bone.value(h.voxel);
     const float after = std::max(0.0F, before - std::min(reached_[i], static_cast<float>(share)));
     if (after == before) continue;

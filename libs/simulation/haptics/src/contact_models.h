@@ -27,7 +27,7 @@ class HeadOverlap {
  public:
   explicit HeadOverlap(double spacing_mm);
   /// With `cutting`, cut() is what it would take there.
-  const OverlapResult& measure(const BrickGrid& bone, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept;
+  const OverlapResult& measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept;
   [[nodiscard]] const OverlapResult& last() const { return last_; }
   [[nodiscard]] Cut cut() const noexcept;
 
@@ -39,6 +39,21 @@ class HeadOverlap {
   bool cutting_ = false;
   Vec3 at_mm_, axis_;
   std::uint32_t stride_ = 1, phase_ = 0;
+};
+
+/// Beside samples, which know of densities alone: the exact overlap of the head, for what it cuts and for where burrs have been.
+class SampledHead {
+ public:
+  explicit SampledHead(double spacing_mm) : overlap_(spacing_mm) {}
+  void begin(const DeviceSample& pose) noexcept;
+  /// The share of the bone under the head that is really there; 1 where no burr has been.
+  [[nodiscard]] double share(const BrickGrid& bone, const Grains* known) noexcept;
+  [[nodiscard]] Cut cut(const BrickGrid& bone, const Grains* known) noexcept;
+
+ private:
+  HeadOverlap overlap_;
+  DeviceSample pose_;
+  bool measured_ = false;
 };
 
 /// Exact overlap: the stiffness law of the depth of a flat cut of the same volume, against the gradient of the overlap. Where pushes from
@@ -76,6 +91,8 @@ class BurrProxy final : public ContactModel {
   void rest() noexcept override { proxy_.forget(); }
 
  private:
+  [[nodiscard]] double teeth(const BrickGrid& bone, Vec3 proxy_mm, Vec3 to_hand_mm, Vec3 normal) noexcept;
+
   double spacing_mm_;
   std::vector<RoundCone> shells_;
   std::vector<const CutDepth*> shell_depths_;
@@ -84,7 +101,8 @@ class BurrProxy final : public ContactModel {
   GodObject proxy_;
   std::size_t tool_ = 0;
   bool cutting_ = false;
-  Vec3 advance_mm_, axis_;
+  double teeth_mm_ = 0;  // how far they reach beyond the proxy
+  Vec3 axis_;
 };
 
 /// The thesis' volume sampling (section 3.2.3.4 to 3.2.3.6): each sample of the burr's volume that lies in bone pushes it
@@ -107,8 +125,7 @@ class VolumeSampling final : public ContactModel {
   void orient(Tool& tool, const BrickGrid& bone, const std::array<float, 3>& axis) noexcept;
 
   std::vector<Tool> tools_;
-  HeadOverlap head_;
-  DeviceSample last_;
+  SampledHead head_;
 };
 
 /// The thesis' first method (section 3.2.3.4, after Petersik 2002): samples of the burr's surface, each traced towards the axis until it
@@ -122,8 +139,7 @@ class RaySampling final : public ContactModel {
  private:
   static constexpr int kSamples = 400;
   std::vector<BurrSurface> tools_;
-  HeadOverlap head_;
-  DeviceSample last_;
+  SampledHead head_;
 };
 
 }  // namespace osteo::simulation

@@ -27,6 +27,12 @@ const CutDepth& shell_depth(double spacing_mm, std::size_t tool) {
   return it != known.end() ? it->second : known.try_emplace(key, shell_of(instrument_library()[tool], spacing_mm)).first->second;
 }
 
+// How far the teeth of a proxy reach, in voxels; and how much deeper than by what they have before them the hand may be: on flat bone that
+// is as deep as it is.
+constexpr double kTeeth = 0.75, kTeethTell = 1.25;
+// A proxy that is no farther off the surface than this share of its shell rests on it.
+constexpr double kOnIt = 0.5;
+
 // With more voxels under the burr than may change in a tick, their rows take turns.
 std::vector<std::uint32_t> strides_for(double spacing_mm) {
   std::vector<std::uint32_t> strides;
@@ -43,20 +49,21 @@ HeadOverlap::HeadOverlap(double spacing_mm) : strides_(strides_for(spacing_mm)),
   for (const Instrument& i : instrument_library()) heads_.push_back(i.head);
 }
 
-const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, std::size_t tool, Vec3 at_mm, Vec3 axis, bool cutting) noexcept {
+const OverlapResult& HeadOverlap::measure(const BrickGrid& bone, const Grains* known, std::size_t tool, Vec3 at_mm, Vec3 axis,
+                                          bool cutting) noexcept {
   last_ = {};
   cutting_ = cutting && finite(at_mm);
   if (!finite(at_mm)) return last_;
   at_mm_ = at_mm;
   axis_ = axis;
   stride_ = strides_[tool];
-  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, cutting, instrument_library()[tool].falloff_per_rad, stride_, phase_++);
+  last_ = overlap_.measure(bone, heads_[tool], at_mm, axis, known, cutting, instrument_library()[tool].falloff_per_rad, stride_, phase_++);
   return last_;
 }
 
 Cut HeadOverlap::cut() const noexcept {
   if (!cutting_) return {};
-  return {overlap_.hits(), last_.weight_mm3, last_.bone_mm3, at_mm_, axis_, stride_ > 1};
+  return {overlap_.hits(), at_mm_, axis_, stride_ > 1};
 }
 
 ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
@@ -66,7 +73,7 @@ ExactOverlap::ExactOverlap(const ContactParams& params, double spacing_mm) : Con
 ContactResult ExactOverlap::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
   const std::size_t tool = tool_of(pose);
   const Vec3 axis = axis_of(pose);
-  const OverlapResult& o = head_.measure(bone, tool, position_of(pose), axis, pose.pedal != 0);
+  const OverlapResult& o = head_.measure(bone, known_, tool, position_of(pose), axis, pose.pedal != 0);
   ContactResult r = contact_of_overlap(params_, tool, o, axis);
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(o.bone_mm3 / bone.frame().voxel_volume_mm3())));
   return r;
@@ -117,7 +124,7 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   Vec3 where;
   OverlapResult there;
   const auto field = [&](Vec3 x) {
-    there = overlap_.measure(bone, shells_[tool_], x, axis_);
+    there = overlap_.measure(bone, shells_[tool_], x, axis_, known_);
     where = x;
     Clearance c;
     const double pressed = length(there.area_mm2);
@@ -151,11 +158,21 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   const GodObject::Answer answer = proxy_.update(field, at, g);
   const Vec3 offset = answer.proxy_mm - at;
   r.shown_offset_mm = offset;
-  if (!answer.contact) return r;
+  Vec3 normal = answer.normal;
+  if (!answer.contact) {
+    // All that was looked at may be used up just off the surface: it is held all the same.
+    if (!(length(offset) > g.tolerance_mm)) return r;
+    const Clearance c = field(answer.proxy_mm);
+    if (!(c.value_mm < kOnIt * shell) || !(dot(offset, c.normal) > 0)) return r;
+    normal = c.normal;
+  }
   r.depth_mm = length(offset);
+  cutting_ = pose.pedal != 0;
+  if (cutting_) r.depth_mm = std::min(r.depth_mm, teeth(bone, answer.proxy_mm, -offset, normal));
   const double law = params_.force_n(r.depth_mm);
   r.force_n = normalized(offset) * law;
-  r.normal = answer.normal;
+  // A burr that turns has no friction: all walls that it rests on together push against the hand, and all of that presses on it.
+  r.normal = cutting_ ? normalized(offset) : normal;
   r.normal_force_n = std::max(0.0, dot(r.force_n, r.normal));
   if (!(where == answer.proxy_mm)) static_cast<void>(field(answer.proxy_mm));
   if (const double pressed = length(there.area_mm2); pressed > 0) {
@@ -163,15 +180,24 @@ ContactResult BurrProxy::contact(const BrickGrid& bone, const DeviceSample& pose
   }
   r.bone_mm3 = there.bone_mm3;
   r.immersed = static_cast<std::uint32_t>(std::min(4e9, std::ceil(there.bone_mm3 / bone.frame().voxel_volume_mm3())));
-  cutting_ = pose.pedal != 0 && r.normal_force_n > 0;
-  // The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks.
-  advance_mm_ = answer.proxy_mm - offset * std::min(1.0, 0.75 * spacing_mm_ / r.depth_mm);
   return r;
 }
 
-Cut BurrProxy::cut(const BrickGrid& bone) noexcept {
-  head_.measure(bone, tool_, advance_mm_, axis_, cutting_);
-  return head_.cut();
+// The teeth reach a little beyond where the proxy rests, towards the hand but never past it; into what they take there it sinks. Where there
+// is nothing to take so near, they reach farther. Tells how deep the hand is in bone by what the teeth have before them: a shell that rests on
+// bone beside the burr is no reason to press where nothing is left to take.
+double BurrProxy::teeth(const BrickGrid& bone, Vec3 proxy_mm, Vec3 to_hand_mm, Vec3 normal) noexcept {
+  const double far = length(to_hand_mm), usual = kTeeth * spacing_mm_, reach = std::min(far, std::max(teeth_mm_, usual));
+  const Vec3 at = far > 0 ? proxy_mm + to_hand_mm * (reach / far) : proxy_mm;
+  const OverlapResult& there = head_.measure(bone, known_, tool_, at, axis_, true);
+  const bool nothing = known_ != nullptr && !(there.sharp_mm3 > 0);
+  teeth_mm_ = nothing ? reach + 0.25 * spacing_mm_ : 0;
+  if (known_ == nullptr) return far;
+  return kTeethTell * head_cut_depth(tool_)(there.sharp_mm3, -dot(normal, axis_)) + (far - reach);
+}
+
+Cut BurrProxy::cut(const BrickGrid&) noexcept {
+  return cutting_ ? head_.cut() : Cut{};
 }
 
 }  // namespace osteo::simulation

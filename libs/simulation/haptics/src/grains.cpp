@@ -19,6 +19,8 @@ constexpr double kSpareMm = 0.0015;
 // places is an eighth of the square of their distance over its radius. But every fourth tick at least.
 constexpr double kTurnMm = 0.1;
 constexpr std::uint32_t kMostTurns = 4;
+// Cosine between two normals up to which they are of the same side of a voxel.
+constexpr float kAlike = 0.5F;
 
 // Share of a unit cube on the inner side of a plane; `alpha` from its inmost corner, in units of the sum of the normal's parts `m`, which
 // sum to 1 and are none of them 0. R. Scardovelli, S. Zaleski, J. Comput. Phys. 164 (2000), equation 3, as a sum over corners.
@@ -44,6 +46,7 @@ Grains::Grains(const BrickGrid& bone) {
       before[n] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(is[n], 0.0F), 1.0F) * 255 + 0.5F));
   }
   covered_.resize((voxels + 63) / 64);
+  begun_.resize((voxels + 7) / 8);
   // Twice as much as the burr's traces over 80 cm2 of bone need, or as a small piece has voxels.
   slots_.resize(std::clamp(std::bit_ceil(voxels), std::size_t{1024}, (std::size_t{1} << 21) >> (parts_ == 1 ? 1 : parts_ == 2 ? 3 : 6)));
   grains_.resize(slots_.size() * words_);
@@ -93,7 +96,8 @@ void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains&
       const VoxelKey voxel = first + n;
       const std::size_t slot = find(voxel);
       if (slots_[slot].voxel == voxel) continue;
-      slots_[slot] = {voxel, s.grain * kept(is[n], was[n]), s.left};
+      slots_[slot] = {voxel, s.grain * kept(is[n], was[n]), s.left, s.seen, s.towards};
+      begun_[voxel / 8] |= static_cast<std::uint8_t>(1U << (voxel % 8));
       std::copy_n(&known.grains_[std::size_t{*next} * words_], words_, &grains_[slot * words_]);
       ++used_;
     }
@@ -101,7 +105,7 @@ void Grains::inherit(const BrickGrid& bone, const BrickGrid& from, const Grains&
 }
 
 std::size_t Grains::memory_bytes() const {
-  return before_.size() + covered_.size() * sizeof covered_[0] + slots_.size() * sizeof slots_[0] + grains_.size() * sizeof grains_[0];
+  return before_.size() + covered_.size() * sizeof covered_[0] + begun_.size() + slots_.size() * sizeof slots_[0] + grains_.size() * sizeof grains_[0];
 }
 
 // Rows of voxels stay together.
@@ -118,6 +122,8 @@ std::size_t Grains::find(VoxelKey voxel) const noexcept {
 
 // What follows moves up, so that every slot is found from its home without a gap.
 void Grains::erase(std::size_t slot) noexcept {
+  const VoxelKey voxel = slots_[slot].voxel;
+  begun_[voxel / 8] &= static_cast<std::uint8_t>(~(1U << (voxel % 8)));
   const std::size_t last = slots_.size() - 1;
   for (std::size_t next = (slot + 1) & last; slots_[next].voxel != BrickGrid::kNone; next = (next + 1) & last) {
     const std::size_t wanted = home(slots_[next].voxel);
@@ -155,7 +161,8 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
   const auto density = static_cast<double>(bone.value(voxel));
   std::fill_n(left, words_, ~std::uint64_t{0});
   const auto all = static_cast<std::uint32_t>(64 * words_);
-  slots_[slot] = {voxel, static_cast<float>(density / all), all};
+  slots_[slot] = {voxel, static_cast<float>(density / all), all, 0, {}};
+  begun_[voxel / 8] |= static_cast<std::uint8_t>(1U << (voxel % 8));
   if (density >= 1) return;
   // The slope of density by what the 26 neighbours were.
   int slope[3] = {};
@@ -191,7 +198,28 @@ void Grains::fill(const BrickGrid& bone, VoxelKey voxel, std::size_t slot) noexc
   }
 }
 
-float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
+Grains::Felt Grains::felt(VoxelKey voxel, float density, float share, const float* normal) const noexcept {
+  const Slot& s = slots_[find(voxel)];
+  const Felt spread{density * share, density};
+  const float cosine = (normal[0] * s.towards[0] + normal[1] * s.towards[1] + normal[2] * s.towards[2]) * (1.0F / 127);
+  const float alike = std::clamp(cosine * (1 / kAlike), 0.0F, 1.0F);
+  if (!(alike > 0)) return spread;
+  const float kept = std::min(density, static_cast<float>(s.left) * s.grain), may_go = density - kept;
+  Felt nested;
+  if (share >= s.seen) {
+    nested.slope = s.seen < 1 ? kept / (1 - s.seen) : density;
+    nested.bone = may_go + (share - s.seen) * nested.slope;
+  } else if (may_go > s.seen) {
+    nested.slope = may_go / s.seen;
+    nested.bone = share * nested.slope;
+  } else if (share > s.seen - may_go) {
+    nested.slope = 1;
+    nested.bone = share - (s.seen - may_go);
+  }
+  return {alike * nested.bone + (1 - alike) * spread.bone, alike * nested.slope + (1 - alike) * spread.slope};
+}
+
+float Grains::reach(const BrickGrid& bone, VoxelKey voxel, float share) noexcept {
   std::uint64_t& bits = covered_[voxel / 64];
   const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
   if ((bits & bit) != 0) return 0;
@@ -220,6 +248,17 @@ float Grains::reach(const BrickGrid& bone, VoxelKey voxel) noexcept {
       const overlap::Shape shape{
           {head_.axis[0], head_.axis[1], head_.axis[2]}, head_.length, head_.start_radius, head_.slope, head_.slope_run, 0, head_.ball};
       s.left = overlap::grain_functions().take(shape, at, parts_, &grains_[slot * words_]);
+      float n[3], n2 = 1e-12F, cosine = 0;
+      for (std::size_t a = 0; a < 3; ++a) {
+        n[a] = at[a] - t * head_.axis[a];
+        n2 += n[a] * n[a];
+      }
+      const float scale = 127 / std::sqrt(n2);
+      for (std::size_t a = 0; a < 3; ++a) cosine += n[a] * scale * s.towards[a] * (1.0F / (127 * 127));
+      if (share > s.seen || cosine < kAlike) {
+        s.seen = share;
+        for (std::size_t a = 0; a < 3; ++a) s.towards[a] = static_cast<std::int8_t>(n[a] * scale);
+      }
     }
     if (s.left > 0) return static_cast<float>(s.left) * s.grain;
     erase(slot);

@@ -20,11 +20,12 @@ HandGuide guide_of(const SceneAction& a) {
 
 void GuideLaw::set(const HandGuide& guide, const DeviceTraits& device, double contact_damping_n_s_per_m, double tick_s) noexcept {
   guide_ = guide;
+  borne_ = safe_stiffness_n_per_mm(device, contact_damping_n_s_per_m, tick_s) / 2;
   if (guide.stiffness_n_per_mm < 0) {
     const double held = 5 * (device.damping_n_s_per_m + guide.damping_n_s_per_m) / 1000;
     stiffness_ = -std::min({-guide.stiffness_n_per_mm, kAwayStiffness, held});
   } else {
-    stiffness_ = std::min(guide.stiffness_n_per_mm, safe_stiffness_n_per_mm(device, contact_damping_n_s_per_m, tick_s) / 2);
+    stiffness_ = std::min(guide.stiffness_n_per_mm, borne_);
   }
 }
 
@@ -63,8 +64,12 @@ Vec3 GuideLaw::step(Vec3 at_mm, const Hand& hand, const DeviceSample& leader, Ve
   }
   const double strength = static_cast<double>(leader.buttons & kLeadStrength) / double{kLeadStrength};
   const double most = away ? std::min(guide_.most_n, kAwayN) : guide_.most_n;
+  // What is forwarded gives way as the hand goes off, no more steeply than the device bears.
+  Vec3 forwarded = leader_force_n * (guide_.forward * share_);
+  if (const double n = length(forwarded), limit = std::min(guide_.most_n, borne_ * kNearMm); n > limit) forwarded = forwarded * (limit / n);
+  pull += forwarded * std::max(0.0, 1 - std::max(0.0, beyond) / kNearMm);
   if (const double n = length(pull); n > most) pull = pull * (most / n);
-  Vec3 force = (pull + leader_force_n * (guide_.forward * share_)) * strength;
+  const Vec3 force = pull * strength;
   return std::isfinite(dot(force, force)) ? force : Vec3{};
 }
 

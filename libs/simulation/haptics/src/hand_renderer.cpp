@@ -92,10 +92,15 @@ void HandRenderer::feel(const DeviceSample& sample) noexcept {
   contact_ = {};
   touched_count_ = 0;
   loaded_ = nullptr;
-  if (!led || guide_.guide().own_contact) meet();
-
-  Vec3 elastic = contact_.force_n, torque = contact_.torque_n_mm;
-  if (common_.params.effects.shaft && has_head() && (!led || guide_.guide().own_contact)) shaft(elastic, torque);
+  const bool meets = !led || guide_.guide().own_contact;
+  Vec3 elastic, torque;
+  // A jump has no way that a shaft could have been stopped on; another tool was not there before.
+  if (!common_.params.effects.shaft || !has_head() || !meets || in.jumped || pose_.tool != held_tool_) let_shaft_go();
+  held_tool_ = pose_.tool;
+  if (common_.params.effects.shaft && has_head() && meets) hold_shaft(elastic, torque);
+  if (meets) meet();
+  elastic += contact_.force_n;
+  torque += contact_.torque_n_mm;
   if (usable_ && !(soft_.normal == Vec3{})) {
     const double push = std::clamp(soft_.force_n + soft_.stiffness_n_per_mm * dot(soft_.at_mm - at_, soft_.normal), 0.0, law_.max_force_n);
     elastic += soft_.normal * push;
@@ -209,6 +214,7 @@ void HandRenderer::touch() noexcept {
     own.position_mm = to_floats(at);
     own.axis = to_floats(item.body_from_world.rotation * axis_);
     model->set(law_);
+    model->know(&item.bone->grains());
     Touch& t = touched_[touched_count_++];
     t = {&item, model, model->contact(item.bone->bone(), own)};
     const Mat3& turn = item.world_from_body.rotation;
@@ -270,25 +276,40 @@ void HandRenderer::escape() noexcept {
   flags_ |= kEscape;
 }
 
-void HandRenderer::shaft(Vec3& elastic, Vec3& torque) noexcept {
+void HandRenderer::let_shaft_go() noexcept {
+  for (const HapticScene::Item& item : common_.scene->items) item.hands[number_]->shaft.forget();
+}
+
+// The tool is where its shaft can be: behind bone the hand pulls at it, but what is at its tip goes by where it is.
+void HandRenderer::hold_shaft(Vec3& elastic, Vec3& torque) noexcept {
   const RoundCone& shape = instrument_->shaft;
   HapticScene& scene = *common_.scene;
-  OverlapResult o;
+  // A burr's shaft follows it into what it cuts, so its shell must not touch the walls.
+  const double gap = instrument_->head.end_radius_mm - shape.start_radius_mm;
+  Vec3 farthest;
   for (const HapticScene::Item& item : scene.items) {
+    HeldShaft& shaft = item.hands[number_]->shaft;
     const Vec3 own = item.body_from_world(at_), own_axis = item.body_from_world.rotation * axis_;
     if (scene.items.size() > 1 &&
-        !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm), 0.5 * shape.length_mm + shape.largest_radius_mm() + 1))
+        !item.bone->near(own + own_axis * (shape.start_mm + 0.5 * shape.length_mm), 0.5 * shape.length_mm + shape.largest_radius_mm() + 1)) {
+      shaft.forget();
       continue;
-    add(o, turned(item.hands[number_]->shaft.measure(item.bone->bone(), shape, own, own_axis), item.world_from_body.rotation));
+    }
+    const BrickGrid& bone = item.bone->bone();
+    double shell = 0.5 * bone.frame().spacing_mm.x;
+    if (instrument_->kind == InstrumentKind::burr && gap > 0) shell = std::min(shell, 0.5 * gap);
+    const HeldShaft::Answer held = shaft.follow(bone, &item.bone->grains(), shape, shell, own, own_axis);
+    const double far = length(held.offset_mm);
+    if (!(far > 0)) continue;
+    const Vec3 offset = item.world_from_body.rotation * held.offset_mm;
+    if (far > length(farthest)) farthest = offset;
+    if (!held.contact) continue;
+    const double push = law_.force_n(far);
+    elastic += offset * (push / far);
+    torque += item.world_from_body.rotation * held.torque_mm * push;
+    if (push > 0) flags_ |= kShaftContact;
   }
-  const double pressed = length(o.area_mm2);
-  if (!(pressed > 0)) return;
-  const Vec3 normal = o.area_mm2 * (-1 / pressed);
-  const double depth = shaft_cut_depth(pose_.tool)(o.sharp_mm3, -dot(normal, axis_));
-  const double push = push_left(o, depth, shape) * law_.force_n(depth);
-  elastic += normal * push;
-  torque += cross(axis_, o.area_foot_mm3) * (-push / pressed);
-  if (push > 0) flags_ |= kShaftContact;
+  at_ += farthest;
 }
 
 // Of a burr that turns; of all else what it slides over.

@@ -64,7 +64,8 @@ class HandRenderer {
   void touch() noexcept;
   void combine() noexcept;
   void escape() noexcept;
-  void shaft(Vec3& elastic, Vec3& torque) noexcept;
+  void hold_shaft(Vec3& elastic, Vec3& torque) noexcept;
+  void let_shaft_go() noexcept;
   [[nodiscard]] Vec3 effects() noexcept;
   [[nodiscard]] double thickness() const noexcept;
 
@@ -88,13 +89,13 @@ class HandRenderer {
   // What it remembers of the tick before.
   DeviceSample last_good_;
   bool has_last_ = false;
-  std::uint8_t last_tool_ = 0;
+  std::uint8_t last_tool_ = 0, held_tool_ = 0;
   double speed_rpm_ = 0;
   // Of this tick.
   DeviceSample pose_;
   const Instrument* instrument_ = nullptr;
   Vec3 hand_at_;    // where the hand has the tool
-  Vec3 at_, axis_;  // where the tool is: elsewhere in a cutting guide
+  Vec3 at_, axis_;  // where the tool is: elsewhere in a cutting guide, and where bone holds its shaft
   bool usable_ = false, cuts_ = false;
   std::uint32_t flags_ = 0;
   std::array<Touch, HapticRenderer::kMostTouched> touched_;

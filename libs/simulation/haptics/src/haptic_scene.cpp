@@ -80,7 +80,6 @@ void fit(HapticScene::Item& item, const HapticSetup& setup, const HapticScene::I
 }
 
 void make_room(HapticScene& scene, const HapticSetup& setup) {
-  if (setup.params.effects.shaft) static_cast<void>(shaft_cut_depth(0));  // not in the servo
   std::size_t room = 0;
   for (const HapticScene::Item& i : scene.items) room = std::max(room, most_hits(i.bone->bone().frame().spacing_mm.x));
   scene.changes.resize(room * std::min(HapticRenderer::kMostTouched, scene.items.size()) * setup.hands());
@@ -91,7 +90,7 @@ void make_room(HapticScene& scene, const HapticSetup& setup) {
 ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept {
   const auto it = setup.tool_methods.find(static_cast<int>(tool));
   if (it != setup.tool_methods.end()) return it->second;
-  return instrument_library()[tool].kind == InstrumentKind::saw ? ContactMethod::proxy : usual;
+  return instrument_library()[tool].kind != InstrumentKind::burr ? ContactMethod::proxy : usual;
 }
 
 HandContact::HandContact(const HapticSetup& setup, double spacing_mm, const HandContact* before) : tools(tools_by_method(setup)) {

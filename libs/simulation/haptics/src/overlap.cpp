@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/simd.h"
+#include "osteo/simulation/haptics/grains.h"
 #include "overlap_kernel.h"
 
 namespace osteo::inline simulation {
@@ -30,6 +31,9 @@ const GrainFunctions& grain_functions() {
 
 namespace {
 
+// Sums of floats tell no smaller share of what was summed.
+constexpr double kRounding = 1e-6;
+
 // Where density grows, by central differences. Neighbours mostly lie in the same brick, where they are a step away.
 Vec3 density_slope(const BrickGrid& bone, VoxelKey voxel) noexcept {
   const std::uint32_t brick = voxel / BrickGrid::kVoxels, place = voxel % BrickGrid::kVoxels;
@@ -55,11 +59,11 @@ struct Overlap::PartialBuffer {
 };
 
 Overlap::Overlap(std::size_t most_hits) : hits_(most_hits + 512), partial_(std::make_unique<PartialBuffer>()) {
-  partial_->items.resize(1024);
+  partial_->items.resize(4096);
 }
 Overlap::~Overlap() = default;
 
-OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Vec3 start_mm, Vec3 axis, bool want_hits,
+OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Vec3 start_mm, Vec3 axis, const Grains* known, bool want_hits,
                                double falloff_per_rad, std::uint32_t stride, std::uint32_t phase) noexcept {
   OverlapResult result;
   count_ = 0;
@@ -79,7 +83,7 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
   s.falloff = static_cast<float>(falloff_per_rad);
   s.ball = shape.length_mm == 0;
   overlap::Sums sums;
-  overlap::PartialList partial{partial_->items.data(), 0, partial_->items.size()};
+  overlap::PartialList partial{partial_->items.data(), 0, partial_->items.size(), known != nullptr ? known->begun() : nullptr};
   overlap::HitList list;
   list.hits = want_hits ? hits_.data() : nullptr;
   list.capacity = hits_.size() - 512;
@@ -124,9 +128,23 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
   // The product of density and share is right when bone and shape are spread through a voxel without regard to each other. Where both end
   // in it by a plane each, how the planes face decides: facing each other they share what is too much for the voxel, facing alike they
   // share the lesser part. Those bounds (M. Frechet 1951) are mixed by the cosine between the normals.
-  double sharper = 0;
+  // Where a burr has covered a voxel in part, it is known where its bone lies.
+  double sharper = 0, moved = 0;
   for (std::size_t i = 0; i < partial.count; ++i) {
     const overlap::Partial& p = partial.items[i];
+    if (known != nullptr && known->begun(p.voxel)) {
+      const Grains::Felt felt = known->felt(p.voxel, p.density, p.share, p.normal);
+      const double density = static_cast<double>(p.density);
+      moved += static_cast<double>(felt.bone) - density * static_cast<double>(p.share);
+      const double pressed = (std::min(1.0, static_cast<double>(felt.slope)) - density) * static_cast<double>(p.area);
+      sums.surface += pressed;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double along_axis = pressed * static_cast<double>(p.normal[a]);
+        sums.area[a] += along_axis;
+        if (!s.ball) sums.area_foot[a] += along_axis * static_cast<double>(p.foot);
+      }
+      continue;
+    }
     const Vec3 inwards = density_slope(bone, p.voxel);
     const double n = std::sqrt(dot(inwards, inwards));
     if (!(n > 1e-3)) continue;
@@ -138,10 +156,13 @@ OverlapResult Overlap::measure(const BrickGrid& bone, const RoundCone& shape, Ve
     sharper += std::abs(facing) * (bound - product);
   }
   const double area = h * h, volume = area * h;
-  result.bone_mm3 = sums.volume * volume;
-  result.sharp_mm3 = std::max(0.0, (sums.volume + sharper) * volume);
-  result.weight_mm3 = sums.weight * volume;
-  result.surface_mm2 = sums.surface * area;
+  // Where all that is under the shape was covered and taken, what is left of the sums is rounding.
+  const double left = sums.volume + moved;
+  result.spread_mm3 = sums.volume * volume;
+  if (!(left > kRounding * sums.volume)) return result;
+  result.bone_mm3 = left * volume;
+  result.sharp_mm3 = std::max(0.0, (left + sharper) * volume);
+  result.surface_mm2 = std::max(0.0, sums.surface) * area;
   result.area_mm2 = frame.direction * Vec3{sums.area[0], sums.area[1], sums.area[2]} * area;
   result.area_foot_mm3 =
       frame.direction * Vec3{sums.area_foot[0], sums.area_foot[1], sums.area_foot[2]} * volume + result.area_mm2 * shape.start_mm;

@@ -20,7 +20,6 @@ struct Shape {
 /// Sums over voxels, in voxels; n is the outward normal of the shape, A the area of its surface inside a voxel, t the foot.
 struct Sums {
   double volume = 0;         // density * share covered
-  double weight = 0;         // the same times efficiency
   double surface = 0;        // density * A
   double area[3] = {};       // density * A * n
   double area_foot[3] = {};  // density * A * t * n
@@ -34,15 +33,17 @@ struct HitList {
   std::uint32_t stride = 1, phase = 0;
 };
 
-/// A voxel that is bone only in part and covered only in part.
+/// A voxel that is bone only in part and covered only in part, or that a burr has covered in part.
 struct Partial {
   VoxelKey voxel;
   float density, share;
   float normal[3];
+  float area, foot;  // of the shape's surface inside it; where on the axis that stands
 };
 struct PartialList {
   Partial* items = nullptr;
   std::size_t count = 0, capacity = 0;  // beyond it the rest is not listed
+  const std::uint8_t* begun = nullptr;  // a bit for each voxel: a burr has covered it in part; null: none
 };
 
 /// Adds the part of the shape in one brick. `first`: the brick's first voxel minus the start of the axis, in voxels.

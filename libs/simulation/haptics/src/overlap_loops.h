@@ -86,7 +86,7 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
   constexpr float kReach = 3.5F + 0.9F;
   // Farther out than half its diagonal a voxel has no share in the shape.
   constexpr float kOut = 0.9F;
-  F volume{}, weight{}, surface{}, gx{}, gy{}, gz{}, fx{}, fy{}, fz{};
+  F volume{}, surface{}, gx{}, gy{}, gz{}, fx{}, fy{}, fz{};
   for (int k = 0; k < 8; ++k) {
     const float z = first[2] + static_cast<float>(k);
     // The middles of the eight rows of this layer, all at once.
@@ -145,10 +145,16 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
         F area;
         cut_cube(radius - distance - curvature, nx, ny, nz, share, area);
         const M both = (density < all(1)) & (density > all(0)) & (share < all(1)) & (share > all(0));
-        if (any_of(both)) {
+        const unsigned begun = partial.begun != nullptr ? partial.begun[key / 8 + static_cast<std::uint32_t>(k * 8 + j)] : 0U;
+        if (begun != 0 || any_of(both)) {
           for (int l = 0; l < 8 && partial.count < partial.capacity; ++l) {
-            if (both[l] == 0) continue;
-            partial.items[partial.count++] = {key + static_cast<VoxelKey>(k * 64 + j * 8 + l), density[l], share[l], {nx[l], ny[l], nz[l]}};
+            if (both[l] == 0 && ((begun >> l & 1U) == 0 || !(share[l] > 0) || !(density[l] > 0))) continue;
+            partial.items[partial.count++] = {key + static_cast<VoxelKey>(k * 64 + j * 8 + l),
+                                              density[l],
+                                              share[l],
+                                              {nx[l], ny[l], nz[l]},
+                                              area[l],
+                                              t[l]};
           }
         }
         const F pressed = density * area;
@@ -167,18 +173,16 @@ void brick(const Shape& shape, const float* values, const float* first, VoxelKey
       volume += covered;
       if (list.hits == nullptr) continue;
       const F latitude = arc_sine(least(absolute(nx * ax + ny * ay + nz * az), all(1)));
-      const F w = covered * most(all(1) - all(shape.falloff) * latitude, all(0));
-      weight += w;
+      const F efficiency = most(all(1) - all(shape.falloff) * latitude, all(0));
       const std::uint32_t row_number = key / 8 + static_cast<std::uint32_t>(k * 8 + j);
       if ((row_number + list.phase) % list.stride != 0 || list.count >= list.capacity) continue;
       for (int l = 0; l < 8; ++l) {
-        list.hits[list.count] = {key + static_cast<VoxelKey>(k * 64 + j * 8 + l), w[l]};
-        list.count += w[l] > 0 ? 1 : 0;
+        list.hits[list.count] = {key + static_cast<VoxelKey>(k * 64 + j * 8 + l), share[l], efficiency[l]};
+        list.count += covered[l] * efficiency[l] > 0 ? 1 : 0;
       }
     }
   }
   sums.volume += static_cast<double>(sum(volume));
-  sums.weight += static_cast<double>(sum(weight));
   sums.surface += static_cast<double>(sum(surface));
   const F g[3] = {gx, gy, gz}, f[3] = {fx, fy, fz};
   for (int a = 0; a < 3; ++a) {

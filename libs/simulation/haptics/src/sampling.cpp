@@ -18,6 +18,23 @@ Mat3 world_from_tool(Vec3 axis) {
 
 }  // namespace
 
+void SampledHead::begin(const DeviceSample& pose) noexcept {
+  pose_ = pose;
+  measured_ = false;
+}
+
+double SampledHead::share(const BrickGrid& bone, const Grains* known) noexcept {
+  if (known == nullptr || known->used() == 0) return 1;
+  measured_ = true;
+  const OverlapResult& o = overlap_.measure(bone, known, tool_of(pose_), position_of(pose_), axis_of(pose_), pose_.pedal != 0);
+  return o.spread_mm3 > 0 ? std::min(1.0, o.bone_mm3 / o.spread_mm3) : 1;
+}
+
+Cut SampledHead::cut(const BrickGrid& bone, const Grains* known) noexcept {
+  if (!measured_) overlap_.measure(bone, known, tool_of(pose_), position_of(pose_), axis_of(pose_), pose_.pedal != 0);
+  return overlap_.cut();
+}
+
 VolumeSampling::VolumeSampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
   for (const Instrument& i : instrument_library()) {
     Tool tool{sample_head(i.head, i.falloff_per_rad), {}, {}, {}, false};
@@ -44,7 +61,7 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
   ContactResult r;
   const std::size_t number = tool_of(pose);
   Tool& tool = tools_[number];
-  last_ = pose;
+  head_.begin(pose);
   const Vec3 position = position_of(pose), axis = axis_of(pose);
   if (!finite(position)) return r;
   orient(tool, bone, to_floats(axis));
@@ -78,7 +95,8 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
     ++r.immersed;
   }
   if (density_sum < kLeastSamples) return r;
-  r.bone_mm3 = density_sum * tool.samples.sample_volume_mm3;
+  r.bone_mm3 = density_sum * tool.samples.sample_volume_mm3 * head_.share(bone, known_);
+  if (!(r.bone_mm3 > 0)) return r;
   const Vec3 sum{static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz)};
   const Vec3 direction = bone.frame().direction * normalized(sum);
   r.depth_mm = head_cut_depth(number)(r.bone_mm3, -dot(direction, axis));
@@ -92,8 +110,7 @@ ContactResult VolumeSampling::contact(const BrickGrid& bone, const DeviceSample&
 }
 
 Cut VolumeSampling::cut(const BrickGrid& bone) noexcept {
-  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.pedal != 0);
-  return head_.cut();
+  return head_.cut(bone, known_);
 }
 
 RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : ContactModel(params), head_(spacing_mm) {
@@ -103,7 +120,7 @@ RaySampling::RaySampling(const ContactParams& params, double spacing_mm) : Conta
 
 ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& pose) noexcept {
   ContactResult r;
-  last_ = pose;
+  head_.begin(pose);
   const Vec3 position = position_of(pose), axis = axis_of(pose);
   if (!finite(position)) return r;
   const BurrSurface& tool = tools_[tool_of(pose)];
@@ -134,7 +151,9 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
     }
     push += (to_world * from_floats(tool.inward[s])) * (in * h);
   }
-  const double volume = length(push) * tool.sample_area_mm2;  // penetration times area
+  double volume = length(push) * tool.sample_area_mm2;  // penetration times area
+  if (!(volume > 0)) return r;
+  volume *= head_.share(bone, known_);
   if (!(volume > 0)) return r;
   r.normal = normalized(push);
   r.bone_mm3 = volume;
@@ -149,8 +168,7 @@ ContactResult RaySampling::contact(const BrickGrid& bone, const DeviceSample& po
 }
 
 Cut RaySampling::cut(const BrickGrid& bone) noexcept {
-  head_.measure(bone, tool_of(last_), position_of(last_), axis_of(last_), last_.pedal != 0);
-  return head_.cut();
+  return head_.cut(bone, known_);
 }
 
 }  // namespace osteo::simulation

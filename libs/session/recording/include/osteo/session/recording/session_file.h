@@ -17,7 +17,7 @@ namespace osteo::inline session {
 /// gives other bits.
 struct Kernels {
   int burrs = kBurrLibraryVersion;
-  int contact = 1;  ///< forces, guard and removal
+  int contact = 2;  ///< forces, guard and removal
   int scene = 1;    ///< what World::act does
   friend bool operator==(const Kernels&, const Kernels&) = default;
 };

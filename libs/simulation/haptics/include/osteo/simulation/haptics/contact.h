@@ -62,8 +62,6 @@ struct ContactResult {
 /// What a model hands over for removal: every voxel once.
 struct Cut {
   std::span<const Hit> hits;
-  double weight_mm3 = 0;  ///< over all voxels under the burr, also those not listed
-  double bone_mm3 = 0;    ///< the same without efficiency
   Vec3 at_mm, axis;       ///< where the burr cuts: its tip's centre, in the bone's frame
   bool in_turns = false;  ///< only some of the voxels under the burr are listed, others the next time
 };
@@ -76,6 +74,9 @@ class ContactModel {
   virtual ~ContactModel() = default;
   /// The law of force from the next contact() on; `method` is that of the model, whatever it says here.
   void set(const ContactParams& params) noexcept { params_ = params; }
+  /// Where burrs have been in the bone of the contact()s to come; null: nowhere. Must outlive them. With it a burr is pressed by what it may
+  /// still take, and by no bone that it can never reach.
+  void know(const Grains* known) noexcept { known_ = known; }
   /// Force for this pose. A pose that is not finite gives none. No allocation, no exception.
   virtual ContactResult contact(const BrickGrid& bone, const DeviceSample& pose) noexcept = 0;
   /// What the last contact() would cut; empty when the pedal was up. Valid until the next contact().
@@ -87,6 +88,7 @@ class ContactModel {
 
  protected:
   ContactParams params_;
+  const Grains* known_ = nullptr;
 };
 
 /// `spacing_mm` of the bone it will meet: sizes its buffers. `tools`: of instrument_library(), that it is for; none: all. (A proxy makes a
@@ -99,13 +101,15 @@ inline constexpr double kLeastRadiusVoxels = 2;
 /// What to say of such a burr, and what to do about it; empty for the others.
 [[nodiscard]] std::string too_small_for_voxels(const Burr& burr, double spacing_mm);
 
-/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by weight, but nowhere more than what the burr
-/// has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate depends on neither voxels nor ticks.
+/// Takes bone away: rate * force * time * speed / hardness, spread over the voxels of a cut by the bone that may go there and by efficiency,
+/// but nowhere more than what the burr has ever covered (Grains). What voxels cannot give is carried to the next call, so that the rate
+/// depends on neither voxels nor ticks.
 /// Remembers where burrs have been: one for each bone, whichever hand holds them.
 class Removal {
  public:
   explicit Removal(const BrickGrid& bone);
-  /// `hardness` may be null; `hand` below kMostHands. Returns the changed voxels (valid until the next call) and sets what was removed.
+  /// `hardness` may be null; `hand` below kMostHands. Without force nothing goes, but what the burr covers is known from then on. Returns
+  /// the changed voxels (valid until the next call) and sets what was removed.
   std::span<const VoxelChange> remove(BrickGrid& bone, const Cut& cut, const Burr& burr, double force_n, double speed_rpm, double dt_s,
                                       const Hardness* hardness, double& removed_mm3, std::size_t hand = 0) noexcept;
   [[nodiscard]] Grains& grains() { return grains_; }
@@ -114,7 +118,8 @@ class Removal {
  private:
   std::array<double, kMostHands> carry_mm3_{};
   Grains grains_;
-  std::vector<float> reached_;  // of each hit, how much density the burr may still take
+  std::vector<float> reached_;   // of each hit, how much density the burr may still take
+  std::vector<double> weights_;  // and its part in what goes
   std::vector<VoxelChange> changes_;
 };
 

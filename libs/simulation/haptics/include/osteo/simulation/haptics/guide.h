@@ -14,8 +14,8 @@ struct HandGuide {
   std::uint32_t leader = 1;       ///< another
   double stiffness_n_per_mm = 0;  ///< of the spring between them; negative: it pushes away, which amplifies an error. -10 to 10
   double damping_n_s_per_m = 0;   ///< of their velocities' difference; where it pushes away, of the hand's own velocity. 0 to 100
-  double forward = 0;             ///< share of the leader's force that the hand feels too
-  double most_n = 0;              ///< spring and damper together. 0 to 20
+  double forward = 0;             ///< share of the leader's force that the hand feels too, less the farther they are apart
+  double most_n = 0;              ///< all that leads it together. 0 to 20
   double dead_zone_mm = 0;        ///< so far apart they may be
   bool own_contact = true;        ///< the hand meets bone itself; false: it feels nothing but what leads it
   double brake_n_s_per_m = 0;     ///< of the hand's own velocity: what bears a spring to a leader that is heard of late. 0 to 100
@@ -31,12 +31,14 @@ struct HandGuide {
 /// F = Kp (x_leader - x) + Bp (v_leader - v) + g F_leader. (D. Morris 2006, section 3.4.1 has the first and the last term, the spring with
 /// a sign that repels.) Kp is at most half of what a sampled wall may have before this device, so that a wall and the spring together stay
 /// within what is stable. Velocities by differences, smoothed over kSmoothS. The leader's sample says how much of it there is (LeadBits),
-/// so ramps, fading and a lost link follow from recorded samples. The brake is within the limit too. While the leader's time stands still,
-/// its force fades over kFadeS. Pushing away: at most kAwayN and kAwayStiffness, no more than 5/s of the damping, not within
+/// so ramps, fading and a lost link follow from recorded samples. The brake is within the limit too, and so is the leader's force: of that no
+/// more is forwarded than a spring as stiff as the device bears has at kNearMm, and it is gone where hand and leader are kNearMm apart
+/// (beyond the dead zone): a force that does not give way would carry the hand off, since position and force cannot both be given. While the
+/// leader's time stands still, its force fades over kFadeS. Pushing away: at most kAwayN and kAwayStiffness, no more than 5/s of the damping, not within
 /// kAwayClearanceMm of a structure at risk, not above kAwayMmPerS. No allocation. The same input gives the same bits.
 class GuideLaw {
  public:
-  static constexpr double kSmoothS = 0.003, kFadeS = 0.05;
+  static constexpr double kSmoothS = 0.003, kFadeS = 0.05, kNearMm = 0.8;
   static constexpr double kAwayN = 1, kAwayStiffness = 0.05, kAwayClearanceMm = 3, kAwayMmPerS = 50;
 
   struct Hand {
@@ -52,7 +54,7 @@ class GuideLaw {
 
  private:
   HandGuide guide_;
-  double stiffness_ = 0, share_ = 0;
+  double stiffness_ = 0, borne_ = 0, share_ = 0;  // borne: N/mm, of what leads a hand by this device
   Vec3 last_apart_, last_at_, rate_, speed_;  // apart: from the hand to its leader
   bool started_ = false;
 };

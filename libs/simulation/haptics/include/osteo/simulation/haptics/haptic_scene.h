@@ -10,6 +10,7 @@
 #include "osteo/core/data/rigid_transform.h"
 #include "osteo/simulation/bone/world.h"
 #include "osteo/simulation/haptics/haptic_setup.h"
+#include "osteo/simulation/haptics/held_shaft.h"
 
 namespace osteo::inline simulation {
 
@@ -53,7 +54,7 @@ struct HandContact {
   std::array<std::shared_ptr<ContactModel>, EnumNames<ContactMethod>::values.size()> models;
   std::array<std::vector<std::size_t>, EnumNames<ContactMethod>::values.size()> tools;  ///< that each model is for
   ContactModel* in_use = nullptr;                                                       ///< of the instrument in the hand
-  Overlap shaft{0};
+  HeldShaft shaft;
 };
 
 /// A plate as the hand feels it.
@@ -92,7 +93,8 @@ struct HapticScene {
 };
 
 /// The method of contact by instrument, as the setup has it; a saw that nothing is said of goes by its proxy, since a hand would push so
-/// thin a blade through the bone otherwise. `usual`: the method in force, which settings may change.
+/// thin a blade through the bone otherwise, and so does what cannot cut: its tip has no business behind bone. `usual`: the method in force,
+/// which settings may change.
 [[nodiscard]] ContactMethod method_of(const HapticSetup& setup, ContactMethod usual, std::size_t tool) noexcept;
 [[nodiscard]] inline ContactMethod method_of(const HapticSetup& setup, std::size_t tool) noexcept {
   return method_of(setup, setup.params.contact.method, tool);

@@ -24,8 +24,8 @@ class HandRenderer;
 /// Poses to forces and removal, for 1 to kMostHands hands. Owns all buffers but those of the scene. step() neither allocates nor locks nor
 /// throws, and the same sequence of samples, settings and scenes gives the same bits.
 /// In a tick all hands feel the bone as it was at its beginning, each by itself; then burrs take bone away in the order of the hands.
-/// The force: contact of the head by the chosen method, contact of the shaft (exact overlap), both elastic and watched by the passivity
-/// observer; drag of the teeth, along normal x axis (D. Morris 2006, section 3.2.3.7: summed over a ball it is that cross product) and
+/// The tool is where its shaft can be (HeldShaft). The force: contact of the head by the chosen method, pull of the shaft, both elastic and
+/// watched by the observer; drag of the teeth, along normal x axis (D. Morris 2006, section 3.2.3.7: summed over a ball it is that cross product) and
 /// vibration, both motor-driven and in proportion to the burr's speed (drag no more than at Burr::kNominalRpm); a curve's pull. With a
 /// plate in the hand, its contact alone. Then the limits of Guard.
 /// The burr's speed follows speed_rpm * pedal / 255 as a first-order lag, spin_up_s upwards and spin_down_s downwards, and is there within
