@@ -160,6 +160,29 @@ TEST(Words, OfACaseThatSaysLittle) {
   EXPECT_TRUE(verdict_notes(facts).empty());
 }
 
+// Green only where nothing is left to look at.
+TEST(Words, TheBandIsGoodOnlyWhereNothingIsLeftToLookAt) {
+  const TemporaryFolder at;
+  const auto band = [&](const std::string& report, const std::string& verdict) {
+    std::ofstream(at.path() / "manifest.json")
+        << R"({"osteotome_case": 1, "steps": [{"stage": "threshold", "report": {)" + report + "}}]}";
+    std::ofstream(at.path() / "import.json") << verdict;
+    return verdict_band(CaseFacts(at.path())).word;
+  };
+  const std::string good = R"({"status": "good", "source": "DICOM", "findings": []})";
+  EXPECT_EQ(band("", good), "Good");
+  EXPECT_EQ(band(R"("outside_body_left_mm3": 0.0)", good), "Good");
+  EXPECT_EQ(band(R"("outside_body_left_mm3": 400.0)", good), "Good");  // a nose, teeth
+  EXPECT_EQ(band(R"("outside_body_left_mm3": 120000.0)", good), "Look");
+  const std::string finding = R"({"code": "SLICE_BLANK", "severity": "warning", "message": "a slice shows nothing"})";
+  EXPECT_EQ(band("", R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": false}, "findings": [)" +
+                         finding + "]}"),
+            "Look");
+  EXPECT_EQ(band("", R"({"status": "repaired", "source": "DICOM", "set_aside": [], "geometry": {"resampled": true}, "findings": [)" +
+                         finding + "]}"),
+            "Repaired");
+}
+
 TEST(Words, ResolutionGoesByTheCoarsestEdge) {
   const TemporaryFolder at;
   std::ofstream(at.path() / "manifest.json") << R"({"osteotome_case": 1})";

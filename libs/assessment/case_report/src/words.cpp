@@ -102,6 +102,12 @@ sheet::Band verdict_band(const CaseFacts& f) {
       if (first.empty()) first = text(e.find("message"));
     }
   }
+  // Less than any table has, and teeth and the tip of a nose reach so far (libs/imaging/image, threshold).
+  constexpr double kLeastHolderMm3 = 1000;
+  if (const auto left = f.reported("threshold", "outside_body_left_mm3"); status == "good" && left.value_or(0) >= kLeastHolderMm3) {
+    const std::string said = volume_text(*left) + " outside the body are left in the bone, which may be table or head holder";
+    return {"Look", said + "; 'osteo prepare --remove-table' takes them off.", Tone::caution};
+  }
   if (status == "good" && text(f.verdict("source")) == "DICOM")
     return {"Good", "Every slice was taken as the scanner stored it; nothing was guessed, moved or left out.", Tone::good};
   if (status == "good")
@@ -109,7 +115,12 @@ sheet::Band verdict_band(const CaseFacts& f) {
   if (status == "repaired") {
     std::string said = first.empty() ? "Slices were resampled onto upright, even ones." : first;
     if (warnings > 1) said += " And " + std::to_string(warnings - 1) + (warnings == 2 ? " more note, below." : " more notes, below.");
-    return {"Repaired", said, Tone::caution};
+    // A warning alone mends nothing.
+    const Json* const resampled = f.verdict("geometry", "resampled");
+    const Json* const aside = f.verdict("set_aside");
+    const bool moved = resampled != nullptr && resampled->flag() != nullptr && *resampled->flag();
+    const bool left_out = aside != nullptr && !aside->items().empty();
+    return {first.empty() || moved || left_out ? "Repaired" : "Look", said, Tone::caution};
   }
   return {"Not known", "This case holds no verdict of its import.", Tone::caution};
 }

@@ -254,6 +254,9 @@ bool parse(const fs::path& file, DicomHeader& h) {
   h.time_position = text_of(meta, DC::TemporalPositionIdentifier);
   h.kvp = text_of(meta, DC::KVP);
   h.temporal = h.time_position + "/" + text_of(meta, DC::TriggerTime) + "/" + h.kvp;
+  h.concatenation_uid = text_of(meta, DC::ConcatenationUID);
+  h.concatenation_part = meta->Get(DC::InConcatenationNumber).AsInt();
+  h.concatenation_parts = meta->Get(DC::InConcatenationTotalNumber).AsInt();
   h.thickness_mm = meta->Get(DC::SliceThickness).AsDouble();
   h.spacing_tag_mm = meta->Get(DC::SpacingBetweenSlices).AsDouble();
   h.has_tilt_tag = meta->Get(DC::GantryDetectorTilt).GetNumberOfValues() > 0;

@@ -1,6 +1,8 @@
 #include "osteo/imaging/dicom/import.h"
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -8,6 +10,7 @@
 #include "osteo/imaging/dicom/volume.h"
 #include "osteo/imaging/io/volume_io.h"
 #include "pixels.h"
+#include "slice_judge.h"
 #include "value_check.h"
 
 namespace osteo::inline imaging {
@@ -33,8 +36,42 @@ Mat3 direction_of(const std::string& axes) {
   return m;
 }
 
+// What the file leaves open; where the axes are given by hand, it need not state them.
+void tell_findings(Verdict& v, const std::vector<VolumeFinding>& findings, bool axes_given) {
+  for (const VolumeFinding& f : findings) {
+    switch (f.what) {
+      case VolumeFinding::What::axes_not_stated:
+        if (!axes_given)
+          v.add(code::axes_not_stated, Severity::warning, f.text, "see which side is which ('osteo snapshot'); --axes states it");
+        break;
+      case VolumeFinding::What::lengths_converted:
+        v.add(code::lengths_converted, Severity::warning, f.text, "see that the size is that of a body");
+        break;
+      case VolumeFinding::What::places_disagree:
+        v.add(code::places_disagree, Severity::warning, f.text, "find out which of them is right before the sides of the body matter");
+        break;
+    }
+  }
+}
+
+// A header beside its voxels, as of SPM and Analyze: true to the letter it is no DICOM, but nobody is helped by hearing so.
+void refuse_pair(const fs::path& source) {
+  fs::path header = source;
+  const std::string suffix = lower_case(source.extension().string());
+  if (suffix != ".hdr" && suffix != ".img") return;
+  if (suffix == ".img") header.replace_extension(source.extension() == ".IMG" ? ".HDR" : ".hdr");
+  std::array<unsigned char, 4> size{};
+  std::ifstream(header, std::ios::binary).read(reinterpret_cast<char*>(size.data()), 4);
+  const auto is = [&](int a, int b, int c, int d) { return size[0] == a && size[1] == b && size[2] == c && size[3] == d; };
+  if (is(0x5C, 1, 0, 0) || is(0, 0, 1, 0x5C))  // 348, the length of such a header, in either byte order
+    throw Error(ExitCode::corrupt,
+                "'" + source.string() + "' is of a pair of files (.hdr and .img, Analyze or NIfTI); pairs are not read, for the older of "
+                                        "them do not state left and right",
+                "save it as one file (.nii.gz)");
+}
+
 // A volume file says nothing of slices; its values are judged as those of a series are.
-Verdict judge_file(Image& image, const ImportParams& params) {
+Verdict judge_file(Image& image, const ImportParams& params, const std::vector<VolumeFinding>& findings) {
   DicomHeader header;
   header.columns = image.frame.dims[0];
   header.rows = image.frame.dims[1];
@@ -47,9 +84,11 @@ Verdict judge_file(Image& image, const ImportParams& params) {
   const auto lowest = *std::min_element(image.span().begin(), image.span().end());
   const auto out = lowest < -1200 || params.hu_offset != 0 ? make_voxels<std::int16_t>(image.frame.voxel_count()) : nullptr;
   std::vector<std::int16_t> scratch(out ? 0 : area);
+  std::vector<dicom::SliceFigure> figures;
   for (int k = 0; k < image.frame.dims[2]; ++k) {
     std::int16_t* const to = out ? out.get() + static_cast<std::size_t>(k) * area : scratch.data();
     dicom::convert_values(header, image.voxels.get() + static_cast<std::size_t>(k) * area, to, count);
+    figures.emplace_back(to, header.columns, header.rows);
     std::replace(to, to + area, dicom::kNoValue, dicom::kAirHu);
   }
   if (out) image.voxels = out;
@@ -60,7 +99,13 @@ Verdict judge_file(Image& image, const ImportParams& params) {
     v.add(code::hu_offset, Severity::warning, format_number(params.hu_offset) + " HU are added to all values, as asked for",
           "look at the mask before you rely on a threshold");
   }
+  tell_findings(v, findings, !params.axes.empty());
   dicom::check_values(v, count, image.frame.voxel_volume_mm3(), params.any_modality);
+  std::vector<dicom::JudgedSlice> layers;
+  for (int k = 0; k < image.frame.dims[2]; ++k)
+    layers.push_back({"layer " + std::to_string(k), k * image.frame.spacing_mm.z});
+  dicom::judge_slices(v, layers, figures,
+                      header.columns * image.frame.spacing_mm.x * header.rows * image.frame.spacing_mm.y);
   if (v.refused()) throw Refused(v);
   return v;
 }
@@ -92,12 +137,14 @@ Imported import_ct(const fs::path& source, const ImportParams& params, const Con
   require_readable(source);
   Imported result;
   if (!fs::is_directory(source) && is_volume_file(source)) {
-    result.image = load_image(source, context);
-    result.verdict = judge_file(result.image, params);
+    std::vector<VolumeFinding> findings;
+    result.image = load_image(source, context, &findings);
+    result.verdict = judge_file(result.image, params, findings);
   } else {
     if (fs::is_directory(source) && fs::is_empty(source)) {
       throw Error(ExitCode::no_input, "the folder '" + source.string() + "' is empty", "give the folder with the CT's slices");
     }
+    if (!fs::is_directory(source)) refuse_pair(source);
     const PlaceOptions options = place_options(params);
     const DicomScan scan = scan_dicom(source, options, context.sub(0, 0.2));
     const DicomSeries& series = choose_series(scan, params.series, source.string());

@@ -2,9 +2,11 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "osteo/core/base/param.h"
+#include "osteo/imaging/dicom/verdict_codes.h"
 #include "place_parts.h"
 
 namespace osteo::inline imaging::dicom {
@@ -211,7 +213,7 @@ class StackJudge {
       }
       const double along = s[i].along_mm - pitch * static_cast<double>(i);
       jitter = std::max(jitter, std::sqrt(j2));
-      if (j2 > 0.05 * 0.05) shifted.push_back(pictures_.name_of(stack_[i]));
+      if (j2 > kShiftMm * kShiftMm) shifted.push_back(pictures_.name_of(stack_[i]));
       off = std::max(off, std::sqrt(along * along + side2));
     }
     p.even = off <= kSamePlaceMm;
@@ -224,12 +226,12 @@ class StackJudge {
     for (const Candidate& c : stack_) corners = std::max(corners, pictures_.corner_deviation(c, stack_.front()));
     v.position_error_mm += corners;
 
-    if (v.tilt_deg > 0.05) {
+    if (v.tilt_deg > kTiltDeg) {
       v.add(
           code::tilted, Severity::info,
           "the slices lean by " + format_number(std::round(v.tilt_deg * 100) / 100) + " degrees (gantry tilt); they are resampled upright");
     }
-    if (jitter > 0.05) {
+    if (jitter > kShiftMm) {
       v.add(code::shifted_sideways, Severity::warning,
             (shifted.size() == 1 ? "one slice ('" + shifted.front() + "') is shifted sideways by "
                                  : std::to_string(shifted.size()) + " slices are shifted sideways against the others by up to ") +
@@ -256,14 +258,53 @@ class StackJudge {
                 format_number(std::round(v.tilt_deg * 100) / 100) + "; the positions count");
     }
     if (h.spacing_tag_mm != 0 && std::abs(std::abs(h.spacing_tag_mm) - v.gap_usual_mm) > 0.01 * v.gap_usual_mm) {
-      v.add(
-          code::spacing_tag_wrong, Severity::info,
-          "the tag SpacingBetweenSlices says " + mm(h.spacing_tag_mm) + ", the positions " + mm(v.gap_usual_mm) + "; the positions count");
+      // Both the tag and the numbers of the slices say that there is a slice between each two.
+      const double parts = v.gap_usual_mm / std::abs(h.spacing_tag_mm);
+      const long skip = std::lround(parts);
+      const bool left_out = skip > 1 && std::abs(parts - static_cast<double>(skip)) < 0.01 * parts && every_nth(skip);
+      v.add(code::spacing_tag_wrong, left_out ? Severity::warning : Severity::info,
+            "the tag SpacingBetweenSlices says " + mm(h.spacing_tag_mm) + ", the positions " + mm(v.gap_usual_mm) +
+                (left_out ? ", and the slices' numbers go up by " + std::to_string(skip) +
+                                ": slices between those that are here seem not to have been sent"
+                          : "; the positions count"),
+            left_out ? "ask for the whole series: fine structures between slices are not in the scan" : "");
+    }
+  }
+
+  // Whether the numbers of nearly all slices go up, or down, by n.
+  [[nodiscard]] bool every_nth(long n) const {
+    const auto& s = result_.slices;
+    std::size_t steps = 0;
+    for (std::size_t i = 1; i < s.size(); ++i)
+      steps += std::abs(static_cast<long>(headers_[s[i].header].instance) - headers_[s[i - 1].header].instance) == n ? 1 : 0;
+    return steps * 10 >= (s.size() - 1) * 9;
+  }
+
+  // A scan over several multi-frame files: each says which part it is, and how many there are.
+  void judge_concatenation() {
+    std::map<std::string, std::pair<int, std::set<int>>> scans;
+    for (const Candidate& c : stack_) {
+      const DicomHeader& h = headers_[c.header];
+      if (h.concatenation_uid.empty() || h.concatenation_parts <= 0) continue;
+      auto& [parts, there] = scans[h.concatenation_uid];
+      parts = std::max(parts, h.concatenation_parts);
+      there.insert(h.concatenation_part);
+    }
+    for (const auto& [uid, scan] : scans) {
+      const auto& [parts, there] = scan;
+      const int missing = parts - static_cast<int>(there.size());
+      if (missing <= 0) continue;
+      result_.verdict.add(code::concatenation_incomplete, Severity::warning,
+                          "the scan is spread over " + std::to_string(parts) + " files, of which " + std::to_string(missing) +
+                              (missing == 1 ? " is" : " are") + " not here: a part of the body is missing",
+                          "copy the missing files from their source");
+      return;
     }
   }
 
   void judge_rest() {
     Verdict& v = result_.verdict;
+    judge_concatenation();
     if (stack_.size() < 10) {
       v.add(code::few_slices, Severity::warning, "there are only " + std::to_string(stack_.size()) + " slices");
     }

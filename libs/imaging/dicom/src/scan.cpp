@@ -182,7 +182,7 @@ void judge(DicomSeries& s, const PlaceOptions& options, double& price) {
   s.usable = true;
   const Vec3 n = p.normal;
   s.what = std::string(std::abs(n.z) > 0.7 ? "axial" : std::abs(n.y) > 0.7 ? "coronal" : std::abs(n.x) > 0.7 ? "sagittal" : "oblique");
-  if (p.verdict.tilt_deg > 0.05) s.what += ", tilted";
+  if (p.verdict.has(code::tilted)) s.what += ", tilted";
   if (p.verdict.has(code::gaps_uneven)) s.what += ", uneven";
   if (p.verdict.has(code::slices_missing)) s.what += ", holes";
   if (p.verdict.has(code::slices_overlap)) s.what += ", overlapping";

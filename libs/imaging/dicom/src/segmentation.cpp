@@ -18,6 +18,7 @@
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/dicom/objects.h"
 #include "pixels.h"
+#include "seg_layers.h"
 
 namespace osteo::inline imaging {
 namespace {
@@ -244,6 +245,21 @@ bool read_position(DcmSegmentation& seg, Uint32 frame, Vec3& position) {
   return fg != nullptr && fg->getImagePositionPatient(position.x, position.y, position.z).good();
 }
 
+// Whether a frame has the axes and pixels of the first.
+bool lies_as(DcmSegmentation& seg, Uint32 frame, Vec3 along_row, Vec3 along_column, double row_mm, double column_mm) {
+  FGInterface& groups = seg.getFunctionalGroups();
+  auto* const orientation = OFstatic_cast(FGPlaneOrientationPatient*, groups.get(frame, DcmFGTypes::EFG_PLANEORIENTPATIENT));
+  auto* const measures = OFstatic_cast(FGPixelMeasures*, groups.get(frame, DcmFGTypes::EFG_PIXELMEASURES));
+  Vec3 u, v;
+  Float64 row = 0, column = 0;
+  if (orientation == nullptr || orientation->getImageOrientationPatient(u.x, u.y, u.z, v.x, v.y, v.z).bad() || measures == nullptr ||
+      measures->getPixelSpacing(row, 0).bad() || measures->getPixelSpacing(column, 1).bad())
+    return false;
+  constexpr double kSame = 1e-3;
+  return length(u - along_row) < kSame && length(v - along_column) < kSame && std::abs(row - row_mm) < kSame * row_mm &&
+         std::abs(column - column_mm) < kSame * column_mm;
+}
+
 // Compressed pixels of a segmentation as they would be uncompressed.
 void unpack_pixels(const fs::path& path, DcmDataset& d) {
   const TemporaryFolder scratch;
@@ -338,33 +354,23 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
   std::vector<double> along;
   for (Uint32 i = 0; i < frames; ++i) {
     if (!read_position(*seg, i, at[i])) throw fail("frame " + std::to_string(i + 1) + " states no position");
+    if (!lies_as(*seg, i, u, v, row_mm, column_mm))
+      throw fail("frame " + std::to_string(i + 1) + " is turned against the first, or has other pixels: the frames make no one volume");
     along.push_back(dot(at[i], f.direction.column[2]));
   }
-  std::vector<double> sorted = along;
-  std::sort(sorted.begin(), sorted.end());
-  double pitch = 0;
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    const double gap = sorted[i] - sorted[i - 1];
-    if (gap > kSamePlaceMm && (pitch == 0 || gap < pitch)) pitch = gap;
-  }
-  if (pitch == 0) {
-    Float64 thickness = 1;
-    if (measures->getSpacingBetweenSlices(thickness).bad() || thickness <= 0) measures->getSliceThickness(thickness);
-    pitch = thickness > 0 ? thickness : 1;
-  }
-  const double low = sorted.front();
-  const int layers = static_cast<int>(std::lround((sorted.back() - low) / pitch)) + 1;
-  const std::size_t first = static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin());
-  f.origin_mm = at[first];
-  f.spacing_mm = {column_mm, row_mm, pitch};
-  f.dims = {columns, rows, layers};
-  if (layers > 65535) throw fail("its frames do not lie evenly above each other");
+  Float64 spacing_mm = 0, thickness_mm = 0;
+  if (measures->getSpacingBetweenSlices(spacing_mm).bad()) spacing_mm = 0;
+  if (measures->getSliceThickness(thickness_mm).bad()) thickness_mm = 0;
+  const dicom::SegLayers layers = dicom::place_seg_frames(along, spacing_mm, thickness_mm);
+  if (!layers.problem.empty()) throw fail(layers.problem);
+  if (!layers.warning.empty()) context.warn("'" + path.string() + "': " + layers.warning);
+  f.origin_mm = at[static_cast<std::size_t>(std::min_element(along.begin(), along.end()) - along.begin())];
+  f.spacing_mm = {column_mm, row_mm, layers.pitch_mm};
+  f.dims = {columns, rows, layers.count};
   require_valid(f);
   for (Uint32 i = 0; i < frames; ++i) {
-    const double k = std::round((along[i] - low) / pitch);
-    if (length(at[i] - f.world_from_index({0, 0, k})) > 0.05) {
-      throw fail("its frames do not lie evenly and straight above each other");
-    }
+    const Vec3 off = at[i] - f.world_from_index({0, 0, static_cast<double>(layers.layer[i])});
+    if (length(off) > 0.05) throw fail("its frames do not lie straight above each other");
   }
 
   for (std::size_t s = 1; s <= seg->getNumberOfSegments(); ++s) {
@@ -389,7 +395,7 @@ Labels load_segmentation(const fs::path& path, const Context& context) {
     if (group == nullptr || group->getReferencedSegmentNumber(number).bad() || number < 1 || number > labels.structures.size()) {
       throw fail("frame " + std::to_string(i + 1) + " does not say which segment it shows");
     }
-    std::uint8_t* const out = voxels.get() + static_cast<std::size_t>(std::lround((along[i] - low) / pitch)) * area;
+    std::uint8_t* const out = voxels.get() + static_cast<std::size_t>(layers.layer[i]) * area;
     const auto mark = [&](std::size_t p) {
       overlap += out[p] != 0 ? 1 : 0;
       out[p] = static_cast<std::uint8_t>(number);

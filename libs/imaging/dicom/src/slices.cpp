@@ -58,6 +58,10 @@ void SliceReader::read(std::size_t begin, std::size_t end, const std::vector<std
     context.progress(static_cast<double>(++done) / static_cast<double>(list.size()), "reading slices");
   });
   if (damaged) throw DamagedFile(*damaged);
+  parallel_for(end - begin, 1, context.threads, [&](std::size_t first, std::size_t) {
+    const std::size_t k = begin + first;
+    figures_[k] = SliceFigure(out[k], placement_.verdict.columns, placement_.verdict.rows);
+  });
   for (const ValueCount& c : counts) count_.add(c);
 }
 

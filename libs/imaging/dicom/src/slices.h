@@ -8,6 +8,7 @@
 #include "osteo/core/data/frame.h"
 #include "osteo/imaging/dicom/place.h"
 #include "pixels.h"
+#include "slice_judge.h"
 
 namespace osteo::inline imaging::dicom {
 
@@ -19,15 +20,19 @@ struct DamagedFile {
 
 class SliceReader {
  public:
-  SliceReader(const std::vector<DicomHeader>& headers, const Placement& placement) : headers_(headers), placement_(placement) {}
+  SliceReader(const std::vector<DicomHeader>& headers, const Placement& placement)
+      : headers_(headers), placement_(placement), figures_(placement.slices.size()) {}
   /// Reads slices [begin, end) into out[slice]; throws DamagedFile for the first that cannot be read.
   void read(std::size_t begin, std::size_t end, const std::vector<std::int16_t*>& out, const Context& context);
   [[nodiscard]] const ValueCount& count() const { return count_; }
+  /// Of the slices read so far; those of others are empty.
+  [[nodiscard]] const std::vector<SliceFigure>& figures() const { return figures_; }
 
  private:
   const std::vector<DicomHeader>& headers_;
   const Placement& placement_;
   ValueCount count_;
+  std::vector<SliceFigure> figures_;
   std::map<std::size_t, std::vector<std::int16_t>> decoded_;  // compressed multi-frame files, kept
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "osteo/core/base/param.h"
+#include "osteo/imaging/dicom/verdict_codes.h"
 
 namespace osteo::inline imaging::dicom {
 namespace {
@@ -37,9 +38,8 @@ std::string whole(double v) {
 
 namespace {
 
-// How much of a body bone can be: a skull fills up to 45 cm2 of each slice on average, a pelvis 60. More is soft tissue or air on a wrong
-// scale, or a threshold that is not bone's.
-constexpr double kMostBoneCm2 = 80, kBoneHu = 300;
+// More bone than kMaxBoneCm2 is soft tissue or air on a wrong scale, or a threshold that is not bone's.
+constexpr double kBoneHu = 300;
 
 void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double total, double voxel_mm3, double pixels) {
   double bone = 0;
@@ -47,7 +47,7 @@ void check_bone(Verdict& v, const std::vector<std::uint32_t>& histogram, double 
   const double bone_mm3 = bone / std::max(total, 1.0) * pixels * voxel_mm3;
   double height_mm = 0;
   for (std::size_t a = 0; a < 3; ++a) height_mm += std::abs(v.output.direction.column[a].z) * v.output.spacing_mm[a] * v.output.dims[a];
-  if (height_mm <= 0 || bone_mm3 / height_mm <= kMostBoneCm2 * 100) return;
+  if (height_mm <= 0 || bone_mm3 / height_mm <= kMaxBoneCm2 * 100) return;
   v.add(code::bone_implausible, Severity::warning,
         whole(bone_mm3 / 1000) + " cm3 are at " + whole(kBoneHu) + " HU or above, " + whole(bone_mm3 / height_mm / 100) +
             " cm2 of each slice on average: more than a body has bone",
@@ -191,7 +191,7 @@ void check_values(Verdict& v, const ValueCount& count, double voxel_mm3, bool an
   if (second.share > 0.02 && apart > 940 && apart < 1130) {
     // Unsigned pixels whose intercept was left out begin at 0, which is -1024 by custom.
     const double offset = count.hu_min == 0 && low < 80 ? -1024 : std::round(-1000 - low);
-    const bool small = std::abs(offset) < 200;
+    const bool small = std::abs(offset) < kShiftedHu;
     c.histogram = raw;
     c.offset_hu = offset;
     v.add(code::hu_shifted, small ? Severity::warning : grave,

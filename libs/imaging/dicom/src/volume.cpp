@@ -6,6 +6,7 @@
 #include "osteo/core/base/parallel.h"
 #include "osteo/core/base/param.h"
 #include "osteo/imaging/io/vtk_data.h"
+#include "slice_judge.h"
 #include "slices.h"
 #include "value_check.h"
 
@@ -114,13 +115,20 @@ double layer_distance(const Placement& p) {
   return extent / (std::round(extent / pitch) * each);
 }
 
-void finish(Placement& p, const Frame& frame, const dicom::ValueCount& count, const PlaceOptions& options) {
+void finish(Placement& p, const Frame& frame, const SliceReader& reader, const PlaceOptions& options) {
   Verdict& v = p.verdict;
   v.output = frame;
   for (std::size_t k = 0; k < v.slices.size(); ++k) {
     v.slices[k].output_index = v.resampled ? p.slices[k].along_mm / frame.spacing_mm.z : static_cast<double>(k);
   }
-  dicom::check_values(v, count, p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm, options.any_modality);
+  dicom::check_values(v, reader.count(), p.column_spacing_mm * p.row_spacing_mm * p.verdict.gap_usual_mm, options.any_modality);
+  std::vector<dicom::JudgedSlice> slices;
+  for (const SliceRecord& s : v.slices) {
+    // Where all slices are of one file, it is the picture that tells them apart.
+    const bool one_file = v.slices.size() > 1 && v.slices.front().file == v.slices.back().file;
+    slices.push_back({one_file || s.frame > 0 ? s.file + " (picture " + std::to_string(s.frame + 1) + ")" : s.file, s.along_mm});
+  }
+  dicom::judge_slices(v, slices, reader.figures(), v.columns * p.column_spacing_mm * v.rows * p.row_spacing_mm);
   if (v.refused()) throw Refused(v);
 }
 
@@ -148,7 +156,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
       frame.spacing_mm = {p.column_spacing_mm, p.row_spacing_mm, mean_gap};
       frame.origin_mm = p.origin_mm;
       frame.direction = {{p.along_row, p.along_column, p.normal}};
-      finish(p, frame, reader.count(), options);
+      finish(p, frame, reader, options);
       if (p.verdict.values.padding_source != "none") {
         parallel_for(area * count, 1 << 18, context.threads, [&](std::size_t begin, std::size_t end) {
           std::replace(pixels.get() + begin, pixels.get() + end, dicom::kNoValue, dicom::kAirHu);
@@ -158,7 +166,7 @@ DicomVolume load_dicom_series(const DicomSeries& series, const PlaceOptions& opt
     } else {
       const double dz = layer_distance(p);
       const Frame frame = lattice_of(p, columns, rows, {p.column_spacing_mm, p.row_spacing_mm, dz});
-      finish(p, frame, reader.count(), options);
+      finish(p, frame, reader, options);
       const SliceSampler sampler(p, columns, rows, frame);
       const auto out = make_voxels<std::int16_t>(frame.voxel_count());
       const auto nx = static_cast<std::size_t>(frame.dims[0]), ny = static_cast<std::size_t>(frame.dims[1]);
@@ -242,7 +250,7 @@ void DicomSlabs::run(int layers_each, const Context& context, const std::functio
       take(z0, layers, slab.data());
       context.progress((z0 + layers) * share, "resampling");
     }
-    finish(p, frame, reader.count(), impl_->options);
+    finish(p, frame, reader, impl_->options);
     impl_->verdict = p.verdict;
   });
 }

@@ -97,6 +97,7 @@ void take_table_off(std::uint8_t* mask, const Image& ct, const ThresholdParams& 
   }
   context.report("table", said);
   context.report("outside_body_mm3", static_cast<double>(cleared) * voxel_mm3);
+  context.report("outside_body_left_mm3", static_cast<double>(all - cleared) * voxel_mm3);
 }
 
 void drop_small_pieces(std::uint8_t* mask, const Frame& frame, const ThresholdParams& p, const Context& context) {

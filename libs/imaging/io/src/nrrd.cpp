@@ -203,7 +203,9 @@ void read_shape(Header& header, RawVolume& raw, const fs::path& path) {
     std::string& directions = header.fields["space directions"];
     if (directions.starts_with("none")) directions.erase(0, 4);
   }
-  if (sizes.size() != 3) fail(path, "it has " + std::to_string(sizes.size()) + " axes; a volume has three");
+  if (sizes.size() != 3)
+    fail(path, "it has " + std::to_string(sizes.size()) + " axes; a volume has three",
+         sizes.size() == 4 ? "a series over time or of channels: save one of its volumes as a file of its own" : "");
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(sizes[a] >= 1 && sizes[a] <= 65536)) fail(path, "the size " + format_number(sizes[a]) + " is out of range");
     raw.frame.dims[a] = static_cast<int>(sizes[a]);
@@ -211,9 +213,16 @@ void read_shape(Header& header, RawVolume& raw, const fs::path& path) {
 }
 
 // World axes: LPS unless the header says RAS or LAS.
-void read_place(const Header& header, Frame& frame, const fs::path& path) {
+void read_place(const Header& header, RawVolume& raw, const fs::path& path) {
+  Frame& frame = raw.frame;
   const std::string space = lower_case(header.get("space"));
   Vec3 to_lps{1, 1, 1};
+  if (space != "lps" && space != "left-posterior-superior" && space != "ras" && space != "right-anterior-superior" && space != "las" &&
+      space != "left-anterior-superior") {
+    raw.findings.push_back({VolumeFinding::What::axes_not_stated,
+                            (space.empty() ? "the NRRD header states no anatomical space" : "the NRRD space '" + space + "' is not anatomical") +
+                                std::string(": left and right, front and back, head and foot are not known; LPS is taken")});
+  }
   if (space == "ras" || space == "right-anterior-superior") to_lps = {-1, -1, 1};
   if (space == "las" || space == "left-anterior-superior") to_lps = {1, -1, 1};
   if (!header.get("space directions").empty()) {
@@ -234,6 +243,42 @@ void read_place(const Header& header, Frame& frame, const fs::path& path) {
     if (o.size() != 3) fail(path, "'space origin' needs three numbers");
     frame.origin_mm = {o[0] * to_lps.x, o[1] * to_lps.y, o[2] * to_lps.z};
   }
+}
+
+// Quoted words: "mm" "mm" "mm".
+std::vector<std::string> quoted(const std::string& text) {
+  std::vector<std::string> words;
+  for (std::size_t at = text.find('"'); at != std::string::npos;) {
+    const std::size_t end = text.find('"', at + 1);
+    if (end == std::string::npos) break;
+    words.push_back(text.substr(at + 1, end - at - 1));
+    at = text.find('"', end + 1);
+  }
+  return words;
+}
+
+// Lengths in mm: by "space units" of the space's axes, or "units" of the volume's where it has spacings only.
+void read_units(const Header& header, RawVolume& raw, const fs::path& path) {
+  const char* const key = header.get("space units").empty() ? "units" : "space units";
+  std::vector<std::string> units = quoted(header.get(key));
+  if (units.size() > 3) units.erase(units.begin(), units.end() - 3);  // the first is of layers
+  std::erase(units, "");
+  if (units.empty()) return;
+  if (std::any_of(units.begin(), units.end(), [&](const std::string& u) { return u != units.front(); }))
+    fail(path, "its axes have different units ('" + units.front() + "', '" + units.back() + "')", "save it in millimetres");
+  static const std::map<std::string, double, std::less<>> kMillimetres{
+      {"mm", 1},         {"millimeter", 1},      {"millimeters", 1},  {"millimetre", 1}, {"millimetres", 1}, {"cm", 10},
+      {"centimeter", 10}, {"centimetre", 10},    {"m", 1000},         {"meter", 1000},   {"meters", 1000},   {"metre", 1000},
+      {"metres", 1000},  {"um", 1e-3},           {"\xC2\xB5m", 1e-3}, {"\xCE\xBCm", 1e-3}, {"micron", 1e-3},   {"microns", 1e-3},
+      {"micrometer", 1e-3}, {"micrometre", 1e-3}, {"nm", 1e-6},       {"inch", 25.4},    {"in", 25.4}};
+  const auto mm = kMillimetres.find(lower_case(units.front()));
+  if (mm == kMillimetres.end()) {
+    fail(path, "its unit of length '" + units.front() + "' ('" + key + "') is not known", "save it in millimetres (\"mm\")");
+  }
+  convert_lengths(raw, mm->second, units.front() + " ('" + key + "')");
+}
+
+void require_valid_in(const fs::path& path, const Frame& frame) {
   try {
     require_valid(frame);
   } catch (const Error& e) {
@@ -279,10 +324,22 @@ RawVolume read_nrrd(const fs::path& path) {
   RawVolume raw;
   raw.notes = std::move(header.notes);
   read_shape(header, raw, path);
-  read_place(header, raw.frame, path);
+  read_place(header, raw, path);
+  read_units(header, raw, path);
+  require_valid_in(path, raw.frame);
 
   const auto files = data_files_of(header, path);
   const std::size_t scalar = size_of(raw.type), size = raw.frame.voxel_count() * scalar * static_cast<std::size_t>(raw.layers);
+  double there = 0;
+  for (const fs::path& f : files) {
+    require_readable(f);
+    there += static_cast<double>(fs::file_size(f));
+  }
+  const bool packed = lower_case(header.get("encoding")) != "raw";
+  // A plain body that is short is told by how many bytes there are.
+  if (packed || size > (std::size_t{1} << 32))
+    require_room(path, static_cast<double>(raw.frame.voxel_count()) * raw.layers, static_cast<double>(scalar),
+                 files.empty() ? static_cast<double>(bytes.size() - *header.body) : there, packed);
   auto voxels = std::make_shared_for_overwrite<std::byte[]>(size);
   const std::span<std::byte> all(voxels.get(), size);
   if (files.empty()) {

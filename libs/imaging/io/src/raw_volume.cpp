@@ -29,6 +29,25 @@ std::size_t size_of(Scalar type) {
   return 0;
 }
 
+void convert_lengths(RawVolume& raw, double mm, const std::string& unit) {
+  if (mm == 1) return;
+  raw.frame.spacing_mm = raw.frame.spacing_mm * mm;
+  raw.frame.origin_mm = raw.frame.origin_mm * mm;
+  const auto text = [](double v) { return format_number(std::round(v * 1e6) / 1e6); };
+  const Vec3 s = raw.frame.spacing_mm;
+  raw.findings.push_back({VolumeFinding::What::lengths_converted, "the file's lengths are in " + unit + " and were converted: voxels of " +
+                                                                      text(s.x) + " x " + text(s.y) + " x " + text(s.z) + " mm"});
+}
+
+void require_room(const std::filesystem::path& path, double voxels, double bytes_each, double there, bool packed) {
+  constexpr double kMaxInflation = 1032, kHeader = 1024;
+  if (voxels * bytes_each <= (packed ? (there + kHeader) * kMaxInflation : there + kHeader)) return;
+  throw Error(ExitCode::corrupt,
+              "'" + path.string() + "': its header states " + format_number(voxels) + " voxels, which " + format_number(there) +
+                  " bytes cannot hold",
+              "the header is wrong or the file was cut short; copy it again from its source");
+}
+
 Image image_from(const RawVolume& raw, const Context& context) {
   require_valid(raw.frame);
   if (raw.layers != 1) throw Error(ExitCode::corrupt, "it holds several layers: a label map, not a CT");
@@ -44,7 +63,8 @@ Image image_from(const RawVolume& raw, const Context& context) {
     for (std::size_t i = 0; i < n; ++i) {
       const double v = static_cast<double>(p[i]);
       if (!std::isfinite(v)) {
-        throw Error(ExitCode::corrupt, "voxel " + std::to_string(i) + " is not a finite number");
+        throw Error(ExitCode::corrupt, "voxel " + std::to_string(i) + " is not a finite number (NaN or infinite)",
+                    "programs that resample or mask mark what lies outside so: write air there, -1024, and save the volume again");
       }
       lo = std::min(lo, v);
       hi = std::max(hi, v);

@@ -10,6 +10,7 @@
 #include "osteo/core/base/context.h"
 #include "osteo/core/data/volume.h"
 #include "osteo/imaging/io/segments.h"
+#include "osteo/imaging/io/volume_io.h"
 
 namespace osteo::inline imaging::io {
 
@@ -22,6 +23,7 @@ struct RawVolume {
   std::shared_ptr<const void> data;          ///< frame.voxel_count() * layers scalars in machine byte order, layer fastest, then x
   int layers = 1;                            ///< label maps of 3D Slicer may hold several that overlap
   std::map<std::string, std::string> notes;  ///< key:=value lines of NRRD
+  std::vector<VolumeFinding> findings;       ///< what the file leaves open
 };
 
 /// Calls f with a pointer to the scalars as what they are.
@@ -65,9 +67,16 @@ void visit_scalars(const RawVolume& raw, F&& f) {
 [[nodiscard]] std::vector<Segment> segments_of(const RawVolume& raw);
 
 [[nodiscard]] RawVolume read_nrrd(const std::filesystem::path& path);
-[[nodiscard]] RawVolume read_nifti(const std::filesystem::path& path, const Context& context);
+[[nodiscard]] RawVolume read_nifti(const std::filesystem::path& path);
 [[nodiscard]] RawVolume read_meta(const std::filesystem::path& path);
 [[nodiscard]] RawVolume read_vti(const std::filesystem::path& path);
+
+/// Spacing and origin times `mm`, the file's unit in millimetres, with a finding where that is not 1. `unit`: "metres (xyzt_units)".
+void convert_lengths(RawVolume& raw, double mm, const std::string& unit);
+
+/// Error(corrupt) when `there` bytes of a file cannot hold the `voxels` its header states: checked before memory is asked for. Packed
+/// bytes (deflate) grow at most 1032 times.
+void require_room(const std::filesystem::path& path, double voxels, double bytes_each, double there, bool packed);
 
 void write_nrrd(const RawVolume& raw, const std::filesystem::path& path);
 void write_nifti(const RawVolume& raw, const std::filesystem::path& path);

@@ -15,18 +15,18 @@ namespace {
 
 struct Format {
   std::string_view suffix;
-  io::RawVolume (*read)(const fs::path&, const Context&);
+  io::RawVolume (*read)(const fs::path&);
   void (*write)(const io::RawVolume&, const fs::path&);
 };
 
 constexpr std::array<Format, 7> kFormats{{
-    {".nrrd", [](const fs::path& p, const Context&) { return io::read_nrrd(p); }, io::write_nrrd},
-    {".nhdr", [](const fs::path& p, const Context&) { return io::read_nrrd(p); }, nullptr},
+    {".nrrd", io::read_nrrd, io::write_nrrd},
+    {".nhdr", io::read_nrrd, nullptr},
     {".nii", io::read_nifti, io::write_nifti},
     {".nii.gz", io::read_nifti, io::write_nifti},
-    {".mha", [](const fs::path& p, const Context&) { return io::read_meta(p); }, io::write_meta},
-    {".mhd", [](const fs::path& p, const Context&) { return io::read_meta(p); }, nullptr},
-    {".vti", [](const fs::path& p, const Context&) { return io::read_vti(p); }, io::write_vti},
+    {".mha", io::read_meta, io::write_meta},
+    {".mhd", io::read_meta, nullptr},
+    {".vti", io::read_vti, io::write_vti},
 }};
 
 const Format* format_of(const fs::path& path) {
@@ -37,14 +37,20 @@ const Format* format_of(const fs::path& path) {
   return nullptr;
 }
 
-io::RawVolume load_raw(const fs::path& path, const Context& context) {
+io::RawVolume load_raw(const fs::path& path, const Context& context, std::vector<VolumeFinding>* findings = nullptr) {
   require_readable(path);
   const Format* const format = format_of(path);
   if (format == nullptr) {
     throw Error(ExitCode::corrupt, "'" + path.string() + "' is not a volume file by its name",
                 "volumes are .nrrd, .nii, .nii.gz, .mha, .mhd, .vti, or a folder of DICOM files through 'import'");
   }
-  return format->read(path, context);
+  io::RawVolume raw = format->read(path);
+  if (findings != nullptr) {
+    *findings = raw.findings;
+  } else {
+    for (const VolumeFinding& f : raw.findings) context.warn("'" + path.filename().string() + "': " + f.text);
+  }
+  return raw;
 }
 
 // Errors of a conversion name the file.
@@ -76,8 +82,8 @@ void save_volume(const Volume<T>& volume, io::Scalar type, const fs::path& path,
 bool is_volume_file(const fs::path& path) {
   return format_of(path) != nullptr;
 }
-Image load_image(const fs::path& path, const Context& context) {
-  return in_file(path, [&, raw = load_raw(path, context)] { return io::image_from(raw, context); });
+Image load_image(const fs::path& path, const Context& context, std::vector<VolumeFinding>* findings) {
+  return in_file(path, [&, raw = load_raw(path, context, findings)] { return io::image_from(raw, context); });
 }
 Labels load_labels(const fs::path& path, const Context& context) {
   return in_file(path, [&, raw = load_raw(path, context)] { return io::labels_from(raw, context); });

@@ -15,10 +15,11 @@
 #include <vtkXMLImageDataWriter.h>
 #include <vtkmetaio/metaImage.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <iostream>
-
-#include <cmath>
+#include <sstream>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -152,12 +153,54 @@ void write_vti(const RawVolume& raw, const fs::path& path) {
   });
 }
 
-RawVolume read_nifti(const fs::path& path, const Context& context) {
+namespace {
+
+// How the two forms of a NIfTI header differ, where it has both. Found before the reader, which calls a mirrored one an error of the file.
+void require_like_handed(vtkNIFTIImageHeader& h, const fs::path& path) {
+  if (h.GetSFormCode() <= 0 || h.GetQFormCode() <= 0) return;
+  const double *const x = h.GetSRowX(), *const y = h.GetSRowY(), *const z = h.GetSRowZ();
+  const double s = dot(cross(Vec3{x[0], x[1], x[2]}, Vec3{y[0], y[1], y[2]}), Vec3{z[0], z[1], z[2]});
+  const double q = h.GetPixDim(0) < 0 ? -1 : 1;
+  if (s * q < 0)
+    fail(path, "its two forms (sform and qform) are mirror images of each other: which side is left is not known",
+         "find out which is right and write both alike");
+}
+
+// How far apart two frames put the same voxel, at most.
+double farthest_apart(const Frame& a, const Frame& b) {
+  double most = 0;
+  for (int c = 0; c < 8; ++c) {
+    const Vec3 corner{(c & 1) != 0 ? a.dims[0] - 1.0 : 0.0, (c & 2) != 0 ? a.dims[1] - 1.0 : 0.0, (c & 4) != 0 ? a.dims[2] - 1.0 : 0.0};
+    most = std::max(most, length(a.world_from_index(corner) - b.world_from_index(corner)));
+  }
+  return most;
+}
+
+}  // namespace
+
+RawVolume read_nifti(const fs::path& path) {
   require_readable(path);
   const QuietVtk quiet;
   vtkNew<vtkNIFTIImageReader> reader;
   if (reader->CanReadFile(path.c_str()) == 0) fail(path, "this is not a NIfTI file");
   reader->SetFileName(path.c_str());
+  reader->UpdateInformation();
+  vtkNIFTIImageHeader* const header = reader->GetNIFTIHeader();
+  const bool readable = header != nullptr && quiet.first_message().empty();
+  if (header != nullptr) {
+    require_like_handed(*header, path);
+    std::int64_t volumes = 1, voxels = 1;
+    for (int a = 1; a <= 7 && a <= header->GetDim(0); ++a) {
+      const auto n = std::max<std::int64_t>(1, header->GetDim(a));
+      (a <= 3 ? voxels : volumes) *= n;
+    }
+    if (readable && volumes > 1)
+      fail(path, "it holds " + std::to_string(volumes) + " volumes (a series over time, or of channels), not one",
+           "save the one to be used as a file of its own");
+    if (readable && (path.extension() == ".gz" || voxels > 1'000'000'000))
+      require_room(path, static_cast<double>(voxels), header->GetBitPix() / 8.0, static_cast<double>(fs::file_size(path)),
+                   path.extension() == ".gz");
+  }
   reader->Update();
   if (reader->GetErrorCode() != 0 || !quiet.first_message().empty()) {
     fail(path, "cannot be read: " + quiet.first_message(), "the file may be cut short; copy it again from its source");
@@ -167,12 +210,31 @@ RawVolume read_nifti(const fs::path& path, const Context& context) {
   vtkMatrix4x4* const sform = reader->GetSFormMatrix();
   vtkMatrix4x4* const qform = reader->GetQFormMatrix();
   if (sform != nullptr) {
+    Frame other = raw.frame;
     frame_from_ras(raw.frame, sform, spacing);
+    if (qform != nullptr) {
+      frame_from_ras(other, qform, spacing);
+      const double apart = farthest_apart(raw.frame, other), voxel = std::min({spacing.x, spacing.y, spacing.z});
+      if (apart > voxel) {
+        double trace = 0;
+        for (std::size_t a = 0; a < 3; ++a) trace += dot(raw.frame.direction.column[a], other.direction.column[a]);
+        const double degrees = std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * 180 / 3.14159265358979323846;
+        raw.findings.push_back({VolumeFinding::What::places_disagree,
+                                "the file states two places (sform and qform) that are turned against each other by " +
+                                    format_number(std::round(degrees * 10) / 10) + " degrees and put a voxel up to " +
+                                    format_number(std::round(apart / voxel * 10) / 10) + " voxels apart; the sform is taken"});
+      }
+    }
   } else if (qform != nullptr) {
     frame_from_ras(raw.frame, qform, spacing);
   } else {
-    context.warn("the NIfTI file states no orientation: left and right are not known");
+    raw.findings.push_back(
+        {VolumeFinding::What::axes_not_stated, "the NIfTI file states no orientation: left and right are not known"});
   }
+  const int unit = header != nullptr ? header->GetXYZTUnits() & 7 : 0;
+  if (unit == 1) convert_lengths(raw, 1000, "metres (xyzt_units)");
+  if (unit == 3) convert_lengths(raw, 1e-3, "micrometres (xyzt_units)");
+  if (unit > 3) fail(path, "its unit of length (xyzt_units " + std::to_string(unit) + ") is none", "save it in millimetres");
   if (std::abs(reader->GetRescaleSlope()) > 0 && (reader->GetRescaleSlope() != 1 || reader->GetRescaleIntercept() != 0)) {
     const double slope = reader->GetRescaleSlope(), intercept = reader->GetRescaleIntercept();
     const std::size_t n = raw.frame.voxel_count();
@@ -237,31 +299,41 @@ void write_nifti(const RawVolume& given, const fs::path& path) {
   });
 }
 
+// The value of a line "KEY = value" of a MetaImage header; empty where there is none.
+std::string meta_value(std::string_view all, std::string_view key) {
+  const std::size_t limit = std::min<std::size_t>(all.size(), 1 << 16);
+  for (std::size_t at = 0; at < limit;) {
+    const std::size_t end = std::min(all.find('\n', at), limit);
+    const std::string_view line = all.substr(at, end - at);
+    const auto trimmed = [](std::string_view text) {
+      while (text.starts_with(' ')) text.remove_prefix(1);
+      while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
+      return text;
+    };
+    const std::size_t equals = line.find('=');
+    if (equals != std::string_view::npos && trimmed(line.substr(0, equals)) == key) return std::string(trimmed(line.substr(equals + 1)));
+    at = end + 1;
+  }
+  return {};
+}
+
 // MetaIO reads what there is of a cut file and says nothing: compare sizes with the header first.
 void require_whole_meta(const fs::path& path) {
   const auto bytes = read_file(path);
   const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto value_of = [&](std::string_view key) -> std::string {
-    const std::size_t limit = std::min<std::size_t>(all.size(), 1 << 16);
-    for (std::size_t at = 0; at < limit;) {
-      const std::size_t end = std::min(all.find('\n', at), limit);
-      std::string_view line = all.substr(at, end - at);
-      const std::size_t equals = line.find('=');
-      if (equals != std::string_view::npos && line.substr(0, equals).find(key) != std::string_view::npos) {
-        line.remove_prefix(equals + 1);
-        while (line.starts_with(' ')) line.remove_prefix(1);
-        while (line.ends_with(' ') || line.ends_with('\r')) line.remove_suffix(1);
-        return std::string(line);
-      }
-      at = end + 1;
-    }
-    return {};
-  };
-  const std::string data_file = value_of("ElementDataFile");
+  const std::string data_file = meta_value(all, "ElementDataFile");
   if (data_file.empty()) fail(path, "this is not a whole MetaImage header", "the file may be cut short; copy it again from its source");
-  if (value_of("CompressedData") != "True") return;  // MetaIO checks the size of plain data
-  const std::string size = value_of("CompressedDataSize");
-  if (size.empty()) return;
+  if (const std::string axes = meta_value(all, "NDims"); !axes.empty() && axes != "3") {
+    fail(path, "it has " + axes + " axes; a volume has three",
+         axes == "4" ? "a series over time or of channels: save one of its volumes as a file of its own" : "");
+  }
+  const bool packed = meta_value(all, "CompressedData") == "True";
+  const bool many_files = data_file.starts_with("LIST") || data_file.find('%') < data_file.size();
+  std::istringstream sizes(meta_value(all, "DimSize"));
+  double voxels = 1;
+  for (double n = 0; sizes >> n;) voxels *= n;
+  const bool huge = voxels > 1e9 && meta_value(all, "BinaryData") != "False";
+  if (many_files || (!packed && !huge)) return;  // MetaIO checks the size of plain data
   std::uint64_t there = 0;
   if (data_file == "LOCAL") {
     const std::size_t line = all.find("ElementDataFile");
@@ -270,6 +342,10 @@ void require_whole_meta(const fs::path& path) {
     require_readable(path.parent_path() / data_file);
     there = fs::file_size(path.parent_path() / data_file);
   }
+  require_room(path, voxels, 1, static_cast<double>(there), packed);
+  if (!packed) return;
+  const std::string size = meta_value(all, "CompressedDataSize");
+  if (size.empty()) return;
   if (static_cast<double>(there) < parse_number(size, "CompressedDataSize")) {
     fail(path, "it holds " + std::to_string(there) + " bytes of packed voxels but needs " + size,
          "the file was cut short; copy it again from its source");
@@ -282,6 +358,8 @@ RawVolume read_meta(const fs::path& path) {
   vtkmetaio::MetaImage meta;
   const QuietCerr quiet;
   if (!meta.Read(path.c_str(), true)) fail(path, "cannot be read as MetaImage", "the file may be cut short or its data file missing");
+  // MetaIO leaves bytes in the file's order (BinaryDataByteOrderMSB); numbers written as text have none.
+  if (meta.BinaryData()) meta.ElementByteOrderFix();
   if (meta.NDims() != 3) fail(path, "it has " + std::to_string(meta.NDims()) + " axes; a volume has three");
   if (meta.ElementNumberOfChannels() != 1) fail(path, "it has several channels; a CT has one");
   RawVolume raw;
@@ -320,6 +398,8 @@ RawVolume read_meta(const fs::path& path) {
     raw.frame.origin_mm[ua] = meta.Offset(a);
     raw.frame.direction.column[ua] = {meta.TransformMatrix(a, 0), meta.TransformMatrix(a, 1), meta.TransformMatrix(a, 2)};
   }
+  if (meta.DistanceUnits() == vtkmetaio::MET_DISTANCE_UNITS_UM) convert_lengths(raw, 1e-3, "micrometres (DistanceUnits)");
+  if (meta.DistanceUnits() == vtkmetaio::MET_DISTANCE_UNITS_CM) convert_lengths(raw, 10, "centimetres (DistanceUnits)");
   try {
     require_valid(raw.frame);
   } catch (const Error& e) {

@@ -17,6 +17,8 @@ namespace reg = registration;
 
 constexpr double kLeastOverlap = 0.25, kMostInverseMm = 1, kManyOff = 1.3, kLike = 0.8;
 constexpr int kLeastEdges = 300;
+// Scans of one head meet to 0.03 to 0.1 mm at half of all edges; from here on a mirror is tried, and believed when it halves that.
+constexpr double kDoubtMm = 0.15, kMirrorBetter = 0.5;
 
 double extent_mm3(const Frame& f) {
   return f.voxel_volume_mm3() * static_cast<double>(f.voxel_count());
@@ -44,6 +46,21 @@ double there_and_back(const RigidTransform& there, const RigidTransform& back, c
   return most;
 }
 
+// As if the file had left and right exchanged: along the axis of the voxels that points most to the side, so that a head stays upright.
+Image in_a_mirror(const Image& image) {
+  std::size_t axis = 0;
+  for (std::size_t a = 1; a < 3; ++a)
+    if (std::abs(image.frame.direction.column[a].x) > std::abs(image.frame.direction.column[axis].x)) axis = a;
+  const auto& d = image.frame.dims;
+  const auto v = make_voxels<std::int16_t>(image.frame.voxel_count());
+  std::size_t at = 0;
+  for (int k = 0; k < d[2]; ++k)
+    for (int j = 0; j < d[1]; ++j)
+      for (int i = 0; i < d[0]; ++i)
+        v[at++] = image.at(axis == 0 ? d[0] - 1 - i : i, axis == 1 ? d[1] - 1 - j : j, axis == 2 ? d[2] - 1 - k : k);
+  return {image.frame, v};
+}
+
 std::string mm(double v) {
   return format_number(std::round(v * 100) / 100) + " mm";
 }
@@ -54,6 +71,9 @@ std::string doubt(const Registration& r, const RegisterParams& p) {
     return "only " + std::to_string(static_cast<int>(std::lround(100 * r.overlap))) + " % of the smaller scan lies inside the other";
   if (r.residual.points < kLeastEdges)
     return "both scans show only " + std::to_string(r.residual.points) + " points of an edge in the same place: too little to go by";
+  if (r.mirror_tried && r.mirror.points >= kLeastEdges && r.mirror.median_mm < kMirrorBetter * r.residual.median_mm)
+    return "the second scan fits better in a mirror, with left and right exchanged: half of all edges then meet to " +
+           mm(r.mirror.median_mm) + " instead of " + mm(r.residual.median_mm) + "; one of the two files is mirrored, or shows the other side";
   if (r.residual.median_mm > p.max_residual_mm)
     return "at half of all edges the other scan's edge is " + mm(r.residual.median_mm) + " off or missing, allowed are " +
            mm(p.max_residual_mm) + ": another patient, the other side, or a body that has changed its shape";
@@ -110,6 +130,13 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   if (seen) r.inverse_mm = there_and_back(r.second_from_first, back, first.frame, second.frame);
   context.progress(0.9, "residual");
   r.residual = reg::edge_residual(a, b, r.second_from_first, context);
+  if (seen && (r.residual.median_mm > kDoubtMm || r.residual.p90_mm > kManyOff * p.max_residual_mm)) {
+    context.progress(0.92, "in a mirror");
+    const reg::Levels c = reg::make_levels(in_a_mirror(second), h, context);
+    const reg::Match other = swapped ? reg::search(c, a, 0, context.sub(0.92, 0.99)) : reg::search(a, c, 0, context.sub(0.92, 0.99));
+    r.mirror_tried = true;
+    r.mirror = reg::edge_residual(a, c, swapped ? other.to_from.inverse() : other.to_from, context);
+  }
   const Mat3& m = r.second_from_first.rotation;
   const double trace = m.column[0].x + m.column[1].y + m.column[2].z;
   r.rotation_deg = portable::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * 180 / std::numbers::pi;
@@ -122,6 +149,7 @@ Registration register_scans(const Image& first, const Image& second, const Regis
   context.report("edge_residual_median_mm", r.residual.median_mm);
   context.report("edge_residual_p90_mm", r.residual.p90_mm);
   context.report("edge_shift_mm", r.residual.shift_mm);
+  if (r.mirror_tried) context.report("mirror_residual_median_mm", r.mirror.median_mm);
   context.report("inverse_consistency_mm", r.inverse_mm);
   if (by_surface) {
     context.report("surface_mean_mm", r.surface_mean_mm);

@@ -38,6 +38,8 @@ struct DicomHeader {
   int series_number = 0, acquisition = 0, instance = 0;
   std::string time_position, kvp;  ///< temporal position and tube voltage as the file gives them
   std::string temporal;            ///< temporal position, trigger time, tube voltage: what tells two pictures of one place apart
+  std::string concatenation_uid;                         ///< of a multi-frame scan over several files; empty for others
+  int concatenation_part = 0, concatenation_parts = 0;  ///< which part this is, from 1, and of how many; 0 when not stated
   double thickness_mm = 0, tilt_tag_deg = 0, spacing_tag_mm = 0;
   bool has_tilt_tag = false, lossy = false;
 

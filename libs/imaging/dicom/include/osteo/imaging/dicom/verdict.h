@@ -10,7 +10,7 @@
 
 namespace osteo::inline imaging {
 
-/// Codes never change their meaning; new ones may come.
+/// Codes never change their meaning; new ones may come. verdict_codes.h says of each how grave it is and whether it refuses.
 namespace code {
 // Files that are not slices of a scan.
 inline constexpr std::string_view not_dicom = "NOT_DICOM", not_an_image = "NOT_AN_IMAGE", no_pixels = "NO_PIXELS", colour = "COLOUR",
@@ -30,7 +30,13 @@ inline constexpr std::string_view not_ct = "NOT_CT", not_a_volume = "NOT_A_VOLUM
                                   several_stacks = "SEVERAL_STACKS", few_slices = "FEW_SLICES", tilt_tag_wrong = "TILT_TAG_WRONG",
                                   spacing_tag_wrong = "SPACING_TAG_WRONG", several_scans = "SEVERAL_SCANS",
                                   frame_of_reference_wrong = "FRAME_OF_REFERENCE_WRONG", projection = "PROJECTION",
-                                  slices_overlap = "SLICES_OVERLAP";
+                                  slices_overlap = "SLICES_OVERLAP", concatenation_incomplete = "CONCATENATION_INCOMPLETE";
+// Pixels of slices that do not fit those beside them.
+inline constexpr std::string_view slice_blank = "SLICE_BLANK", slice_part_missing = "SLICE_PART_MISSING",
+                                  slice_values_step = "SLICE_VALUES_STEP", slice_mirrored = "SLICE_MIRRORED", slice_order = "SLICE_ORDER";
+// What a volume file leaves open.
+inline constexpr std::string_view axes_not_stated = "AXES_NOT_STATED", lengths_converted = "LENGTHS_CONVERTED",
+                                  places_disagree = "PLACES_DISAGREE";
 // The values.
 inline constexpr std::string_view padding_tag = "PADDING_TAG", padding_found = "PADDING_FOUND", padding_tag_wrong = "PADDING_TAG_WRONG",
                                   monochrome1 = "MONOCHROME1", saturated = "SATURATED", metal = "METAL", values_rounded = "VALUES_ROUNDED",

@@ -1,7 +1,9 @@
 // CT volumes and label maps in the formats of the field: NRRD, NIfTI, MetaImage, VTI.
 #pragma once
 #include <filesystem>
+#include <string>
 #include <variant>
+#include <vector>
 
 #include "osteo/core/base/context.h"
 #include "osteo/core/data/volume.h"
@@ -11,9 +13,23 @@ namespace osteo::inline imaging {
 /// True for .nrrd .nhdr .nii .nii.gz .mha .mhd .vti (any case).
 [[nodiscard]] bool is_volume_file(const std::filesystem::path& path);
 
-/// By suffix. The frame comes out in LPS mm whatever the format's own axes are (NIfTI and some NRRD: RAS).
-/// NIfTI: sform when present, else qform; a sheared sform is refused. Errors: no_input, cannot_read, corrupt.
-[[nodiscard]] Image load_image(const std::filesystem::path& path, const Context& context = {});
+/// What a volume file does not state, states in other units, or states twice.
+struct VolumeFinding {
+  enum class What {
+    axes_not_stated,    ///< nothing says which way left, back and head are: NRRD without an anatomical space, NIfTI without a form
+    lengths_converted,  ///< lengths were not in mm
+    places_disagree,    ///< NIfTI's two forms put the voxels at different places
+  };
+  What what = What::axes_not_stated;
+  std::string text;  ///< a sentence, for people
+};
+
+/// By suffix. The frame comes out in LPS mm whatever the format's own axes and units are (NIfTI and some NRRD: RAS; xyzt_units, space
+/// units, DistanceUnits). NIfTI: sform when present, else qform; a sheared sform is refused, as are two forms of which one mirrors the
+/// other. A file of several volumes is refused. What the file leaves open goes into `findings`, or to the log where that is null.
+/// Errors: no_input, cannot_read, corrupt.
+[[nodiscard]] Image load_image(const std::filesystem::path& path, const Context& context = {},
+                               std::vector<VolumeFinding>* findings = nullptr);
 /// The same for values that are whole numbers from 0 to 255. NRRD of 3D Slicer (.seg.nrrd): names and colours come along, and several
 /// layers become one label map (a warning says how many voxels overlapped).
 [[nodiscard]] Labels load_labels(const std::filesystem::path& path, const Context& context = {});

@@ -37,6 +37,8 @@ struct EdgeResidual {
 struct Registration {
   RigidTransform second_from_first;  ///< a point of the first scan, LPS mm, to where the same place is in the second
   EdgeResidual residual;
+  bool mirror_tried = false;   ///< edges meet worse than those of one head do: the second scan was tried with left and right exchanged
+  EdgeResidual mirror;         ///< what came of it
   double overlap = 0;          ///< share of the smaller scan that lies inside the other
   double inverse_mm = 0;       ///< farthest any corner of what both show moves by going there and back, back being found by itself
   double surface_mean_mm = 0;  ///< of bone's surfaces where both are seen; 0 where `method` is mutual
@@ -59,9 +61,14 @@ struct Registration {
 /// algorithm, ICPR 2002), with one more unknown: how much larger the second bone is all round, since thick slices and another kernel move
 /// a thresholded boundary.
 ///
-/// Error(failed) that says why, unless `accept_poor`: edges that do not meet to `max_residual_mm` (another patient, the other side,
-/// not rigid), less than a quarter of the smaller scan inside the other, too few edges, there and back not the same; surface: less than 2
-/// cm3 of bone. Same bytes for any thread count. Memory: both scans at `finest_mm` in single precision. 2 to 5 s for heads.
+/// Where half of all edges are more than 0.15 mm off, or a tenth more than 1.3 times `max_residual_mm`, the second scan is registered in a
+/// mirror as well, by `mutual`: that halves the residual of a file with left and right exchanged, and of nothing else. It takes as long
+/// again.
+///
+/// Error(failed) that says why, unless `accept_poor`: a mirror that fits better, edges that do not meet to `max_residual_mm` (another
+/// patient, the other side, not rigid), less than a quarter of the smaller scan inside the other, too few edges, there and back not the
+/// same; surface: less than 2 cm3 of bone. Same bytes for any thread count. Memory: both scans at `finest_mm` in single precision. 2 to
+/// 5 s for heads, twice that with the mirror.
 [[nodiscard]] Registration register_scans(const Image& first, const Image& second, const RegisterParams& params,
                                           const Context& context = {});
 
