@@ -1,5 +1,6 @@
 // Sessions as another version of the program would write them: other fields, kinds of records, frames.
 #pragma once
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -78,6 +79,23 @@ class OtherWriter {
   std::vector<std::byte> raw_;
 };
 
+// The header's list of instruments or plates as another version has it: only those that `keep` takes, or all, the last
+// first.
+inline void renumber(nlohmann::ordered_json& list, const std::function<bool(const std::string&)>& keep,
+                     bool backwards = false) {
+  auto other = nlohmann::ordered_json::array();
+  for (const auto& one : list) {
+    if (keep(one.at("name"))) other.push_back(one);
+  }
+  if (backwards) std::reverse(other.begin(), other.end());
+  list = other;
+}
+inline std::uint32_t number_in(const nlohmann::ordered_json& list, const std::string& name) {
+  std::uint32_t n = 0;
+  while (n < list.size() && list[n].at("name") != name) ++n;
+  return n;
+}
+
 inline std::vector<RecordField> tick_fields() {
   return {tick_table().fields.begin(), tick_table().fields.end()};
 }
@@ -93,7 +111,9 @@ inline std::vector<RecordField> without(std::string_view name) {
 }
 
 // A session that this program wrote, as another would have written it: frame by frame, each part in one of its own.
-inline void write_otherwise(const std::filesystem::path& from, OtherWriter& to) {
+// `as_there`: what the other has in a tick.
+inline void write_otherwise(const std::filesystem::path& from, OtherWriter& to,
+                            const std::function<void(TickRecord&)>& as_there = {}) {
   const SessionReader reader(from);
   auto parts = reader.parts();
   std::uint64_t next = 0;
@@ -102,7 +122,11 @@ inline void write_otherwise(const std::filesystem::path& from, OtherWriter& to) 
     if (p->checkpoint || p->gap != nullptr || !p->notes.empty()) continue;
     if (!p->ticks.empty()) next = p->ticks.back().tick + 1;
     to.records<SceneAction>(action_record_table().part, action_record_table().fields, p->actions);
-    to.ticks(p->ticks);
+    std::vector<TickRecord> ticks(p->ticks.begin(), p->ticks.end());
+    for (TickRecord& t : ticks) {
+      if (as_there) as_there(t);
+    }
+    to.ticks(ticks);
     to.records<VoxelChange>(change_table().part, change_table().fields, p->changes);
     to.end_frame(kRecordsFrame, first, next);
   }

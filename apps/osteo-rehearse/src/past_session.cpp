@@ -72,6 +72,12 @@ SessionFacts PastSession::facts(const Anatomy& anatomy) const {
         f.structures.push_back({*name->text(), number(s, "least_clearance_mm"), number(s, "touched_s"), number(s, "injured_s")});
     }
   }
+  if (const Json* const cuts = summary->find("structures_cut")) {
+    for (const Json& c : cuts->items()) {
+      if (const Json* const name = c.find("name"); name != nullptr && name->text() != nullptr)
+        f.add_cut(*name->text(), number(c, "mm3"));
+    }
+  }
   return f;
 }
 

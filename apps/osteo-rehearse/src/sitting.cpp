@@ -364,6 +364,9 @@ SessionFacts Sitting::facts_of(const RehearsalSummary& s) const {
                             static_cast<double>(e.ticks_touched) / options_.rate_hz,
                             static_cast<double>(e.ticks_injured) / options_.rate_hz});
   }
+  for (const StructureCutEvent& e : s.structure_cuts) {
+    if (map != nullptr) f.add_cut(map->name_of(e.cut.structure), e.cut.mm3);
+  }
   f.warnings = s.warnings;
   if (!s.gaps.empty()) f.warnings.push_back("NOT RECORDED: " + std::to_string(s.ticks_not_recorded) + " ticks: the disk did not keep up");
   return f;

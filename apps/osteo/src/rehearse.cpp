@@ -215,6 +215,11 @@ int RehearseCommand::run(const Params& p, cli::Invocation& io) {
     io.err << (n.done ? "done otherwise" : "NOT DONE") << " at " << format_number(static_cast<double>(n.tick) / p.rate_hz)
            << " s: " << name_of(n.kind) << ": " << n.why << (n.times > 1 ? " (" + std::to_string(n.times) + " times)" : "") << '\n';
   }
+  for (const StructureCutEvent& e : s.structure_cuts) {
+    if (options.anatomy.structures)
+      io.err << "INJURED at " << format_number(static_cast<double>(e.tick) / p.rate_hz) << " s: the saw cut through "
+             << told_structures_cut(*options.anatomy.structures, std::span(&e.cut, 1)) << '\n';
+  }
   if (s.unusable_poses > 0)
     io.err << "the pose could not be used for " << format_number(static_cast<double>(s.unusable_poses) / p.rate_hz)
            << " s: not finite, or beyond all reach\n";

@@ -80,6 +80,19 @@ TEST(Findings, InjuriesComeFirstAndTouchesAreNoInjuries) {
   for (std::size_t n = 1; n < f.list.size(); ++n) EXPECT_GE(f.list[n - 1].severity, f.list[n].severity);
 }
 
+TEST(Findings, ASawIsCalledASaw) {
+  Score s = plain();
+  s.values.insert(s.values.end(), {measured("touches", 1, "dura"), measured("touched_s", 0.2, "dura"),
+                                   measured("injured_s", 0.2, "dura"), measured("clearance_mm", -0.3, "dura")});
+  s.moments.push_back({8, {}, "reached by the running saw", "dura", -0.1, 0});
+  EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->text,
+            "The running saw reached the dura once, for 0.2 s in all.");
+  EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->times_s, std::vector<double>{8});
+  s.moments.push_back({9, {}, "reached by a turning burr", "dura", -0.1, 0});
+  EXPECT_EQ(findings_of(s, nullptr, nullptr).find("injury-dura")->text,
+            "A turning burr and the running saw reached the dura twice, for 0.2 s in all.");
+}
+
 TEST(Findings, ItemsSayWhatWasAsked) {
   const Procedure p = procedure(
       ", \"items\": [ {\"name\": \"sinus intact\", \"kind\": \"not_violated\", \"structure\": \"sigmoid sinus\"}, {\"name\": \"sinus "
@@ -116,7 +129,7 @@ TEST(Findings, ItemsSayWhatWasAsked) {
   // Not passed though nothing of it is gone: the burr was in it.
   s.items[0].value = 0;
   EXPECT_EQ(findings_of(s, nullptr, &p).find("item-sinus-intact")->text,
-            "Sinus intact: not passed, none of it is gone, but a turning burr reached into it.");
+            "Sinus intact: not passed, none of it is gone, but a running burr or saw reached into it.");
   s.items[0].pass = true;
   EXPECT_EQ(findings_of(s, nullptr, &p).find("item-sinus-intact")->text, "Sinus intact: passed, none of it is gone.");
 }

@@ -7,6 +7,7 @@
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
 #include "osteo/simulation/bone/instrument.h"
+#include "osteo/assessment/evidence/findings.h"
 #include "osteo/assessment/evidence/score.h"
 #include "osteo/session/scene/rehearsal.h"
 #include "osteo/assessment/scoring/score_reader.h"
@@ -113,6 +114,45 @@ TEST(Sessions, LiveAndFromTheFileAreTheSameBits) {
   EXPECT_NEAR(value(file.values, "clearance_mm[rod]"), s.structures.at(1).least_clearance_mm, 1e-5);
   EXPECT_EQ(value(file.values, "touched_s[rod]"), static_cast<double>(s.structures.at(1).ticks_touched) / 1000);
   EXPECT_EQ(value(file.values, "injured_s[rod]"), static_cast<double>(s.structures.at(1).ticks_injured) / 1000);
+}
+
+// The nerve cut through by a plane was told as "no structure was touched".
+TEST(Sessions, ASawThroughAStructureIsTold) {
+  const test::ScratchFolder scratch;
+  const auto told = [&](const std::string& name, const SawCut& cut, const SceneAction& then) {
+    const std::vector<SceneAction> actions{at(100, SceneAction::saw(cut)), at(200, then)};
+    const RehearsalSummary summary = record(scratch / name, 1, actions);
+    return std::pair(summary, score(scratch / name));
+  };
+  const Procedure p = parse_procedure(kProcedure, "t.json");
+  // Straight through the rod, at y 3; it was cut, though that is taken back.
+  const auto [through, cut] =
+      told("through", {{0, 3, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}, SceneAction::plain(ActionKind::undo));
+  // As its labels of 0.4 mm have it: sixteen voxels across.
+  EXPECT_NEAR(value(cut.values, "cut_mm3[rod]") / (16 * 0.4 * 0.4 * 0.8), 1, 0.15);
+  const Findings serious = findings_of(cut, rod().get(), nullptr);
+  ASSERT_NE(serious.find("cut-rod"), nullptr);
+  EXPECT_EQ(serious.find("cut-rod")->severity, FindingSeverity::serious);
+  EXPECT_EQ(serious.find("cut-rod")->text.find("The saw cut through the rod: 1."), 0U) << serious.find("cut-rod")->text;
+  EXPECT_EQ(serious.find("cut-rod")->times_s, std::vector<double>{0.1});
+  EXPECT_LT(length(*serious.find("cut-rod")->at_mm - Vec3{0, 3, 1}), 0.2);
+  EXPECT_EQ(serious.find("untouched"), nullptr);
+  ASSERT_EQ(through.structure_cuts.size(), 1U);
+  EXPECT_EQ(through.structure_cuts[0].tick, 100U);
+  EXPECT_NEAR(through.structure_cuts[0].cut.mm3, value(cut.values, "cut_mm3[rod]"), 1e-9) << "live as from the file";
+  // An item that asks for it whole has failed, though no bone of it is gone.
+  EXPECT_FALSE(score(scratch / "through", &p).items.at(0).pass);
+  // Beside it: half a millimetre of the rod, 0.7 of its labels; and then one through the air, which is none.
+  const auto [beside, missed] = told("beside", {{1.9, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0.8},
+                                     SceneAction::saw({{0, 30, 0}, {0, 1, 0}, {1, 0, 0}, 0.8}));
+  EXPECT_TRUE(beside.structure_cuts.empty());
+  EXPECT_EQ(value(missed.values, "cut_mm3[rod]"), 0);
+  EXPECT_NEAR(value(missed.values, "saw_clearance_mm[rod]"), 0.7, 0.15);
+  const Findings good = findings_of(missed, rod().get(), nullptr);
+  EXPECT_EQ(good.find("cut-rod"), nullptr);
+  ASSERT_NE(good.find("untouched"), nullptr);
+  EXPECT_NE(good.find("untouched")->text.find("The saw's cuts passed the rod at 0."), std::string::npos)
+      << good.find("untouched")->text;
 }
 
 TEST(Sessions, UndoTakesBackWhatWasRemoved) {

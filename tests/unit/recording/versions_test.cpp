@@ -9,6 +9,8 @@
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/simulation/bone/plates.h"
 #include "osteo/session/recording/export.h"
 #include "other_session.h"
 
@@ -97,12 +99,86 @@ TEST(Versions, ALaterSessionIsReadByThisVersion) {
   EXPECT_TRUE(has(s.newer, "pulse_bpm") && has(s.newer, "'nerve'") && has(s.newer, "1 frame of a kind 42")) << s.newer.size();
   EXPECT_EQ(s.newer.size(), 3u);
   EXPECT_EQ(s.not_replayable, "") << "the servo was not fed with what is new";
-  EXPECT_EQ(s.tools.back(), "laser 1 mm");
+  EXPECT_EQ(s.tools.size(), instrument_library().size()) << "a laser that nobody took is no matter";
   export_session(SessionReader(path), out, {});
   const std::string actions = read_text(export_files(out)[1]), notes = read_text(export_files(out)[2]);
   EXPECT_NE(actions.find(",glue,"), std::string::npos) << actions;
   EXPECT_NE(notes.find("0.007,7,\"twitch\",\"{\"\"mv\"\":0.5}\""), std::string::npos) << notes;
   for (const auto& f : export_files(out)) fs::remove(f);
+  fs::remove(path);
+}
+
+// A burr that came later, and stands where it belongs, gives all behind it other numbers: names count.
+TEST(Versions, InstrumentsAndPlatesGoByTheirNames) {
+  const auto path = fresh("renumbered.oss");
+  const std::vector<std::string> used{"cutting 1 mm", "diamond 7 mm", "sucker 8 Fr", "hook 2 mm", "saw 25 mm"};
+  const std::uint32_t plate = static_cast<std::uint32_t>(plate_library().size()) - 1;
+  const std::string plate_name = plate_library()[plate].name;
+  for (const bool shorter : {false, true}) {
+    SessionHeader h = header("earlier");
+    h.haptics.tool_methods[instrument_index("saw 25 mm")] = ContactMethod::proxy;
+    ordered_json instruments, plates;
+    fs::remove(path);
+    {
+      test::OtherWriter w(path, h, test::tick_fields(), [&](ordered_json& j) {
+        // A library without half the burrs, or one that begins with the saw.
+        test::renumber(
+            j["instruments"], [&](const std::string& name) { return !shorter || name.find("taper") == name.npos; },
+            !shorter);
+        test::renumber(
+            j["plates"], [](const std::string&) { return true; }, true);
+        instruments = j["instruments"];
+        plates = j["plates"];
+        for (auto& t : j["haptics"]["tool_methods"]) t[0] = test::number_in(instruments, "saw 25 mm");
+      });
+      auto ticks = some_ticks(0, used.size());
+      for (std::size_t n = 0; n < used.size(); ++n)
+        ticks[n].device.tool = static_cast<std::uint8_t>(test::number_in(instruments, used[n]));
+      SceneAction grip = SceneAction::grip(test::number_in(plates, plate_name)),
+                  away = SceneAction::grip(SceneAction::kNobody);
+      SceneAction off = SceneAction::detach(1);
+      w.records<SceneAction>(action_record_table().part, action_record_table().fields, std::vector{grip, away, off});
+      w.ticks(ticks);
+      w.end_frame(2, 0, ticks.size());
+    }
+    const Session s = read_session(path);
+    ASSERT_EQ(s.ticks.size(), used.size());
+    for (std::size_t n = 0; n < used.size(); ++n) EXPECT_EQ(instrument_of(s.ticks[n].device.tool).name, used[n]);
+    EXPECT_EQ(s.header.haptics.tool_methods, h.haptics.tool_methods);
+    EXPECT_EQ(s.tools.at(s.ticks[3].device.tool), "hook 2 mm");
+    EXPECT_FALSE(s.numbered_alike);
+    ASSERT_EQ(s.actions.size(), 3u);
+    EXPECT_EQ(s.actions[0].action.item, plate);
+    EXPECT_EQ(s.actions[1].action.item, SceneAction::kNobody);
+    EXPECT_EQ(s.actions[2].action.item, 1u) << "a fixed plate has a number of the scene";
+  }
+  fs::remove(path);
+}
+
+TEST(Versions, AnInstrumentThatIsNotKnownIsRefusedByItsName) {
+  const auto path = fresh("laser.oss");
+  const auto write = [&](std::uint8_t tool, std::uint32_t plate) {
+    fs::remove(path);
+    test::OtherWriter w(path, header("later"), test::tick_fields(), [](ordered_json& j) {
+      j["instruments"].insert(j["instruments"].begin() + 3,
+                              ordered_json::object({{"name", "laser 1 mm"}, {"kind", "laser"}}));
+      j["plates"].push_back(ordered_json::object({{"name", "mesh 9"}}));
+    });
+    auto ticks = some_ticks(0, 3);
+    ticks[1].device.tool = tool;
+    w.records<SceneAction>(action_record_table().part, action_record_table().fields,
+                           std::vector{SceneAction::grip(plate)});
+    w.ticks(ticks);
+    w.end_frame(2, 0, 3);
+  };
+  write(4, 0);
+  EXPECT_EQ(instrument_of(read_session(path).ticks[1].device.tool).name, instrument_library()[3].name);
+  write(3, 0);
+  EXPECT_NE(refusal(path).find("recorded with the instrument 'laser 1 mm', which this version does not know"),
+            std::string::npos)
+      << refusal(path);
+  write(4, static_cast<std::uint32_t>(plate_library().size()));
+  EXPECT_NE(refusal(path).find("the plate 'mesh 9'"), std::string::npos) << refusal(path);
   fs::remove(path);
 }
 

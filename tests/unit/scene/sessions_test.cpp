@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 #include <random>
 #include <set>
@@ -9,7 +10,10 @@
 #include "bar.h"
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
+#include "osteo/simulation/bone/instrument.h"
+#include "osteo/assessment/evidence/score.h"
 #include "osteo/session/scene/rehearsal.h"
+#include "osteo/session/scene/session_folder.h"
 #include "other_session.h"
 #include "rewrite_session.h"
 #include "scratch.h"
@@ -158,6 +162,86 @@ TEST(Sessions, OfOtherVersionsAreRepeatedWhereTheServoIsTheSame) {
   World resumed = start.copy();
   apply_recorded(other, resumed);
   EXPECT_EQ(resumed.hash(), other.outline().end->bone_hash) << "what it came to is known all the same";
+}
+
+// A burr added where it belongs turns no recorded saw into another instrument, for whoever reads the session.
+TEST(Sessions, OfAnotherLibraryHaveTheirOwnInstruments) {
+  const test::ScratchFolder scratch;
+  const auto file = scratch / "now.oss", earlier = scratch / "earlier.oss";
+  World world(test::bar(0.5, 0.3));
+  const World start = world.copy();
+  Script s;
+  s.tool = instrument_index("saw 25 mm");
+  s.axis = {1, 0, 0};
+  s.waypoints = {{0, {-12, 0, 6}, true}, {0.5, {-12, 0, 3}, true}};
+  RehearsalOptions o;
+  o.session_file = file;
+  o.haptics.device = SpringHand::traits();
+  Rehearsal(std::move(world), std::make_unique<ScriptedDevice>(s, 1000), o, {}).run_to_end({});
+  {
+    nlohmann::ordered_json list;
+    test::OtherWriter w(earlier, SessionReader(file).header(), test::tick_fields(), [&](nlohmann::ordered_json& j) {
+      test::renumber(j["instruments"], [](const std::string& name) { return name.find("taper") == name.npos; });
+      list = j["instruments"];
+    });
+    test::write_otherwise(file, w, [&](TickRecord& t) {
+      t.device.tool = static_cast<std::uint8_t>(test::number_in(list, instrument_of(t.device.tool).name));
+    });
+  }
+  const Score now = score_session(SessionReader(file), start.copy(), nullptr, nullptr, nullptr, {});
+  const Score then = score_session(SessionReader(earlier), start.copy(), nullptr, nullptr, nullptr, {});
+  EXPECT_EQ(score_lines(then), score_lines(now));
+  EXPECT_NE(score_lines(then).find("saw 25 mm"), std::string::npos) << score_lines(then);
+  const ReplayResult r = replay(SessionReader(earlier), start.copy(), {}, {});
+  EXPECT_TRUE(r.identical) << r.difference;
+}
+
+SessionFolder chained(const fs::path& folder, const std::string& from) {
+  fs::create_directories(folder);
+  write_file(folder / "session.json",
+             R"({"osteotome_session_folder": 1, "case": "..", "resumed_from": ")" + from + "\"}\n");
+  return open_session_folder(folder);
+}
+
+// A folder that was copied and renamed may name itself: that ended in a crash.
+TEST(Sessions, ThatResumeFromEachOtherInACircleAreRefused) {
+  const test::ScratchFolder scratch;
+  const SessionFolder itself = chained(scratch / "1", "../1"), a = chained(scratch / "2", "../3"),
+                      b = chained(scratch / "3", "../2/../2");
+  const SessionFolder behind = chained(scratch / "4", "../2");
+  for (const SessionFolder& s : {itself, a, b, behind}) {
+    for (const auto& ask : {std::function([&] { static_cast<void>(world_at_begin(s, {}, {}, {})); }),
+                            std::function([&] { static_cast<void>(world_at_end(s, {}, {}, {})); }),
+                            std::function([&] { static_cast<void>(world_at(s, 1, {}, {}, {})); })}) {
+      try {
+        ask();
+        FAIL() << s.folder;
+      } catch (const Error& e) {
+        EXPECT_EQ(e.code(), ExitCode::corrupt);
+        EXPECT_NE(std::string(e.what()).find("in a circle"), std::string::npos) << e.what();
+        EXPECT_NE(e.advice().find("session.json"), std::string::npos) << e.advice();
+      }
+    }
+  }
+}
+
+// As long a chain as the disk holds, the first of all first, each up to where the next goes on.
+TEST(Sessions, WhatASessionResumesFromIsListed) {
+  const test::ScratchFolder scratch;
+  fs::create_directories(scratch / "0");
+  write_file(scratch / "0/session.json", R"({"osteotome_session_folder": 1, "case": ".."})");
+  EXPECT_TRUE(sessions_before(open_session_folder(scratch / "0")).empty());
+  constexpr int kLength = 40;
+  for (int n = 1; n <= kLength; ++n)
+    static_cast<void>(chained(scratch / std::to_string(n), "../" + std::to_string(n - 1)));
+  write_file(scratch / "40/session.json",
+             R"({"osteotome_session_folder": 1, "case": "..", "resumed_from": "../39", "resumed_at_s": 2.5})");
+  const auto chain = sessions_before(open_session_folder(scratch / "40"));
+  ASSERT_EQ(chain.size(), static_cast<std::size_t>(kLength));
+  EXPECT_TRUE(fs::equivalent(chain.front().session.folder, scratch / "0"));
+  EXPECT_TRUE(fs::equivalent(chain.back().session.folder, scratch / "39"));
+  EXPECT_EQ(chain.back().until_s, 2.5);
+  EXPECT_EQ(chain[5].until_s, 0);
 }
 
 }  // namespace

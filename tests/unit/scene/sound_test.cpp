@@ -121,7 +121,9 @@ TEST(SoundTracker, HearsHandsActionsAndStructures) {
   drill.structure = 7;
   drill.clearance_mm = 1;
   t.take(drill);
-  EXPECT_EQ(t.state().voices[0].kind, SoundKind::diamond);
+  EXPECT_EQ(t.state().voices[0].kind, SoundKind::burr);
+  EXPECT_EQ(t.state().voices[0].edge_db, row_of(BurrKind::diamond).sound_db);
+  EXPECT_EQ(t.state().voices[0].teeth_share, 0) << "a diamond has none";
   EXPECT_EQ(t.state().voices[0].diameter_mm, 5);
   EXPECT_EQ(t.state().voices[0].thickness_mm, 1.5);
   EXPECT_NEAR(t.state().voices[0].softness, 0.5, 1e-9);
@@ -170,7 +172,8 @@ TEST(SoundTracker, ASawIsHeardAtItsStrokes) {
   saw.speed_rpm = 60000;
   saw.normal_force_n = 2;
   t.take(saw);
-  EXPECT_EQ(t.state().voices[0].kind, SoundKind::cutting);
+  EXPECT_EQ(t.state().voices[0].kind, SoundKind::burr);
+  EXPECT_EQ(t.state().voices[0].teeth_share, row_of(BurrKind::cutting).sound_teeth_share);
   EXPECT_EQ(t.state().voices[0].speed_rpm, 15000);
   EXPECT_EQ(t.state().voices[0].press_n, 2);
 }

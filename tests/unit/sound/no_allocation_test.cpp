@@ -28,7 +28,7 @@ void operator delete(void* p, std::size_t) noexcept {
 TEST(Synthesizer, RendersWithoutAllocating) {
   using namespace osteo;
   SoundState state;
-  state.voices[0] = {SoundKind::cutting, 60000, 4, 2, 0, 0, 0};
+  state.voices[0] = {SoundKind::burr, 60000, 4, 2, 0, 0, 0};
   state.voices[1] = {SoundKind::sucker, 0, 3, 0, 0, 0, 1};
   state.voices[2] = {SoundKind::irrigator, 0, 2, 0, 0, 0, 1};
   state.water = 0.5;

@@ -17,9 +17,16 @@ namespace {
 constexpr double kRate = Synthesizer::kRateHz;
 const SafeLevel kNotHeld{200, 10};
 
-SoundState burr(SoundKind kind, double rpm, double press_n, double diameter_mm = 4, double thickness_mm = 0, double softness = 0) {
+// Of the kinds of burrs there are: level on bone, share of the teeth.
+struct Edge {
+  double db, teeth_share;
+};
+constexpr Edge kCutting{0, 0.5}, kDiamond{-8, 0};
+
+SoundState burr(Edge edge, double rpm, double press_n, double diameter_mm = 4, double thickness_mm = 0,
+                double softness = 0) {
   SoundState s;
-  s.voices[0] = {kind, rpm, diameter_mm, press_n, thickness_mm, softness, 0};
+  s.voices[0] = {SoundKind::burr, rpm, diameter_mm, press_n, thickness_mm, softness, 0, edge.db, edge.teeth_share};
   return s;
 }
 
@@ -74,7 +81,7 @@ TEST(Synthesizer, LinesAreWithinAHertzAndADecibelOfTheTable) {
   int compared = 0;
   for (const double rpm : {20000.0, 43000.0, 60000.0}) {
     for (const double press : {0.0, 2.0}) {
-      const SoundState state = burr(SoundKind::cutting, rpm, press);
+      const SoundState state = burr(kCutting, rpm, press);
       const BurrSpectrum table = burr_spectrum(state.voices[0], model);
       const std::vector<float> x = steady(state, 2);
       for (const SoundLine& line : table.lines) {
@@ -96,7 +103,7 @@ TEST(Synthesizer, LinesAreWithinAHertzAndADecibelOfTheTable) {
 
 TEST(Synthesizer, NoiseIsAsLoudAsTheTableAndFallsAsPublished) {
   const SoundModel model;
-  const SoundState state = burr(SoundKind::diamond, 60000, 2, 5);
+  const SoundState state = burr(kDiamond, 60000, 2, 5);
   const BurrSpectrum table = burr_spectrum(state.voices[0], model);
   const std::vector<float> x = steady(state, 4);
   double lines = 0;
@@ -111,24 +118,24 @@ TEST(Synthesizer, NoiseIsAsLoudAsTheTableAndFallsAsPublished) {
 
 TEST(SoundModel, DifferencesOfLevelsAreThosePublished) {
   const SoundModel m;
-  const auto noise = [&](SoundKind kind, double rpm, double press, double diameter) {
+  const auto noise = [&](Edge kind, double rpm, double press, double diameter) {
     return burr_spectrum(burr(kind, rpm, press, diameter).voices[0], m).noise_db;
   };
-  const double six = noise(SoundKind::cutting, 60000, 1, 6);
-  const double four = six - noise(SoundKind::cutting, 60000, 1, 4), two = six - noise(SoundKind::cutting, 60000, 1, 2);
+  const double six = noise(kCutting, 60000, 1, 6);
+  const double four = six - noise(kCutting, 60000, 1, 4), two = six - noise(kCutting, 60000, 1, 2);
   EXPECT_GE(four, 1);
   EXPECT_LE(four, 6);
   EXPECT_GE(two, 5);
   EXPECT_LE(two, 16);
   // All of a diamond's is noise, half of a cutting burr's: 3 dB of the difference.
-  const double diamond = six + 10 * std::log10(2) - noise(SoundKind::diamond, 60000, 1, 6);
+  const double diamond = six + 10 * std::log10(2) - noise(kDiamond, 60000, 1, 6);
   EXPECT_GE(diamond, 5);
   EXPECT_LE(diamond, 11);
-  const double speed = noise(SoundKind::cutting, 80000, 1, 4) - noise(SoundKind::cutting, 20000, 1, 4);
+  const double speed = noise(kCutting, 80000, 1, 4) - noise(kCutting, 20000, 1, 4);
   EXPECT_GE(speed, 0);
   EXPECT_LE(speed, 5.01);
-  EXPECT_GT(noise(SoundKind::cutting, 60000, 3, 4), noise(SoundKind::cutting, 60000, 1, 4) + 3);
-  EXPECT_LT(noise(SoundKind::cutting, 60000, 0, 4), noise(SoundKind::cutting, 60000, 0.1, 4));
+  EXPECT_GT(noise(kCutting, 60000, 3, 4), noise(kCutting, 60000, 1, 4) + 3);
+  EXPECT_LT(noise(kCutting, 60000, 0, 4), noise(kCutting, 60000, 0.1, 4));
   for (double hz : {8000.0, 12000.0}) EXPECT_LE(envelope_db(hz), -24);
   EXPECT_LE(envelope_db(16000), -60);
   EXPECT_EQ(envelope_db(0), -200);
@@ -145,7 +152,7 @@ TEST(SoundModel, DifferencesOfLevelsAreThosePublished) {
 TEST(SoundModel, ThePitchRisesOverThinBoneAndFallsUnderLoad) {
   const SoundModel m;
   const auto pitch = [&](double press, double thickness) {
-    return burr_spectrum(burr(SoundKind::cutting, 60000, press, 4, thickness).voices[0], m).rotation_hz;
+    return burr_spectrum(burr(kCutting, 60000, press, 4, thickness).voices[0], m).rotation_hz;
   };
   EXPECT_DOUBLE_EQ(pitch(0, 0), 1000);
   EXPECT_DOUBLE_EQ(pitch(1, 0), pitch(1, 5));  // not known: as thick bone
@@ -157,8 +164,8 @@ TEST(SoundModel, ThePitchRisesOverThinBoneAndFallsUnderLoad) {
 
 TEST(Synthesizer, BoneOverSoftTissueIsDuller) {
   const SoundModel model;
-  const std::vector<float> hard = steady(burr(SoundKind::diamond, 60000, 1), 2);
-  const std::vector<float> soft = steady(burr(SoundKind::diamond, 60000, 1, 4, 0, 1), 2);
+  const std::vector<float> hard = steady(burr(kDiamond, 60000, 1), 2);
+  const std::vector<float> soft = steady(burr(kDiamond, 60000, 1, 4, 0, 1), 2);
   EXPECT_LT(band_db(soft, 3000, 5000, model), band_db(hard, 3000, 5000, model) - 10);
   EXPECT_GT(band_db(soft, 600, 1200, model), band_db(hard, 600, 1200, model));
 }
@@ -166,8 +173,8 @@ TEST(Synthesizer, BoneOverSoftTissueIsDuller) {
 TEST(Synthesizer, NothingClicks) {
   // The steepest step between samples that the sound itself has, against all that changes: states that jump each 5 ms.
   Synthesizer s({}, 3, kNotHeld);
-  const SoundState loud = burr(SoundKind::cutting, 20000, 0);  // lines alone, and low ones
-  SoundState states[] = {loud, burr(SoundKind::cutting, 0, 0), burr(SoundKind::diamond, 18000, 0), {}, loud};
+  const SoundState loud = burr(kCutting, 20000, 0);  // lines alone, and low ones
+  SoundState states[] = {loud, burr(kCutting, 0, 0), burr(kDiamond, 18000, 0), {}, loud};
   double step = 0;
   std::vector<float> out(Synthesizer::kBlock);
   float last = 0;
@@ -200,7 +207,8 @@ TEST(Synthesizer, WhateverTheStateSamplesAreFiniteAndBelowOne) {
   std::vector<float> out(100);
   for (int i = 0; i < 3000; ++i) {
     SoundState state;
-    for (SoundVoice& v : state.voices) v = {static_cast<SoundKind>(random() % 5), any(), any(), any(), any(), any(), any()};
+    for (SoundVoice& v : state.voices)
+      v = {static_cast<SoundKind>(random() % 4), any(), any(), any(), any(), any(), any(), any(), any()};
     state.water = any();
     state.metal_n = any();
     state.alarm = static_cast<SoundAlarm>(random() % 3);
@@ -210,7 +218,7 @@ TEST(Synthesizer, WhateverTheStateSamplesAreFiniteAndBelowOne) {
 }
 
 TEST(Synthesizer, TheSameStatesGiveTheSameSamples) {
-  SoundState state = burr(SoundKind::cutting, 60000, 2);
+  SoundState state = burr(kCutting, 60000, 2);
   state.voices[1] = {SoundKind::sucker, 0, 3, 0, 0, 0, 1};
   state.water = 0.5;
   state.alarm = SoundAlarm::touched;
@@ -224,7 +232,7 @@ TEST(Synthesizer, WhatIsLoudForLongIsHeldAtTheSafeLevel) {
   SoundModel model;
   model.contact_db = 100;
   Synthesizer s(model);
-  const SoundState loud = burr(SoundKind::cutting, 80000, 5, 7);
+  const SoundState loud = burr(kCutting, 80000, 5, 7);
   const double first = 20 * std::log10(rms(play(s, loud, 0.2)));
   EXPECT_GT(first, -15);  // a short one passes
   play(s, loud, 40);

@@ -217,7 +217,7 @@ TEST(RehearsalControl, TheSawIsTakenIntoTheHandAndHeldInItsPlane) {
   // A burr puts it away, and takes the guide off; so does its own key.
   control.move_hand({9.5, 0, 20});
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.position_mm[2] > 15; }));
-  press(control, Command::diamond);
+  press(control, Command::burr_kind, static_cast<int>(BurrKind::diamond));
   EXPECT_FALSE(control.tools().saw_in_hand());
   ASSERT_TRUE(frames_until(control, [&] { return !of_world(control, [](const World& w) { return w.cutting_guide().on(); }); }));
   ASSERT_TRUE(frames_until(control, [&] { return control.rehearsal().latest().device.tool == burr_index(BurrKind::diamond, 4); }));
@@ -235,7 +235,7 @@ TEST(RehearsalControl, KeysChooseTheBurrAndLatchTheDrill) {
   ASSERT_TRUE(control.begin(true, false));
   const auto burr = [&] { return burr_library()[static_cast<std::size_t>(control.tool())]; };
   press(control, Command::diameter, 6);
-  press(control, Command::diamond);
+  press(control, Command::burr_kind, static_cast<int>(BurrKind::diamond));
   EXPECT_EQ(burr().diameter_mm, 6);
   EXPECT_EQ(burr().kind, BurrKind::diamond);
   press(control, Command::cylinder);

@@ -217,7 +217,7 @@ TEST(ToolWheel, EachDirectionIsATool) {
 }
 
 TEST(ToolWheel, EachOfItsToolsHasAKey) {
-  for (const WheelItem& item : wheel_items()) EXPECT_FALSE(key_name(item.command).empty()) << item.word;
+  for (const WheelItem& item : wheel_items()) EXPECT_FALSE(key_name(item.command, item.value).empty()) << item.word;
 }
 
 // --- marks

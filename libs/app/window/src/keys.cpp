@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "osteo/simulation/bone/burr_kind.h"
+
 namespace osteo::inline app {
 namespace {
 
@@ -44,7 +46,7 @@ enum : int {
   kKeypadEnter = 335,
 };
 
-constexpr Key kKeys[] = {
+constexpr Key kFixedKeys[] = {
     {'F', Command::bring},
     {'U', Command::lift},
     {kDown, Command::deeper, Key::When::repeated},
@@ -57,8 +59,6 @@ constexpr Key kKeys[] = {
     {'5', Command::diameter, Key::When::pressed, 5},
     {'6', Command::diameter, Key::When::pressed, 6},
     {'7', Command::diameter, Key::When::pressed, 7},
-    {'C', Command::cutting},
-    {'D', Command::diamond},
     {'B', Command::ball},
     {'Y', Command::cylinder},
     {'T', Command::taper},
@@ -138,6 +138,16 @@ constexpr Key kKeys[] = {
     {'G', Command::lead, Key::When::pressed, 0, kWithCtrl},
 };
 
+const std::vector<Key>& all_keys() {
+  static const std::vector<Key> keys = [] {
+    std::vector<Key> all(std::begin(kFixedKeys), std::end(kFixedKeys));
+    for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
+      all.push_back({kBurrKinds[n].key, Command::burr_kind, Key::When::pressed, static_cast<int>(n)});
+    return all;
+  }();
+  return keys;
+}
+
 bool has(const std::vector<Command>& list, Command c) {
   return std::find(list.begin(), list.end(), c) != list.end();
 }
@@ -145,14 +155,15 @@ bool has(const std::vector<Command>& list, Command c) {
 }  // namespace
 
 std::span<const Key> key_table() {
-  return kKeys;
+  return all_keys();
 }
 
 const Key* find_key(int code, int modifiers) {
   const auto with = [&](int wanted) -> const Key* {
-    const auto* const at =
-        std::find_if(std::begin(kKeys), std::end(kKeys), [&](const Key& k) { return k.code == code && k.with == wanted; });
-    return at == std::end(kKeys) ? nullptr : at;
+    const auto& keys = all_keys();
+    const auto at =
+        std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.code == code && k.with == wanted; });
+    return at == keys.end() ? nullptr : &*at;
   };
   const Key* const own = with(modifiers & (kWithCtrl | kWithAlt));
   return own != nullptr ? own : with(0);
@@ -198,9 +209,10 @@ std::string key_word(int code) {
   return std::to_string(code);
 }
 
-std::string key_name(Command command) {
-  for (const Key& key : kKeys) {
-    if (key.command == command) return (key.with == kWithCtrl ? "Ctrl-" : key.with == kWithAlt ? "Alt-" : "") + key_word(key.code);
+std::string key_name(Command command, std::optional<int> value) {
+  for (const Key& key : all_keys()) {
+    if (key.command == command && (!value || key.value == *value))
+      return (key.with == kWithCtrl ? "Ctrl-" : key.with == kWithAlt ? "Alt-" : "") + key_word(key.code);
   }
   return {};
 }
@@ -251,6 +263,17 @@ ButtonCommand command_of(HandFunction function) {
 
 const std::vector<HelpLine>& help_lines() {
   using enum Command;
+  // "1 to 7, C, D", "burr: diameter, cutting, diamond".
+  static const std::string burr_keys = [] {
+    std::string all = "1 to 7";
+    for (const BurrKindRow& kind : kBurrKinds) all += std::string(", ") + kind.key;
+    return all;
+  }();
+  static const std::string burr_words = [] {
+    std::string all = "burr: diameter";
+    for (const BurrKindRow& kind : kBurrKinds) all += ", " + std::string(kind.name);
+    return all;
+  }();
   static const std::vector<HelpLine> lines = {
       {"", "the drill", {}},
       {"move", "moves the drill across the view", {}},
@@ -258,7 +281,7 @@ const std::vector<HelpLine>& help_lines() {
       {"U", "lifts the drill out of the bone, drill off", {lift}},
       {"wheel, Up, Down, Shift-drag", "moves it deeper (away from you) or back", {deeper, back}},
       {"left button, Space", "drills while held; Space: on and off", {drill}},
-      {"1 to 7, C, D", "burr: diameter, cutting, diamond", {diameter, cutting, diamond}},
+      {burr_keys.c_str(), burr_words.c_str(), {diameter, burr_kind}},
       {"B, Y, T", "ball, cylinder, taper", {ball, cylinder, taper}},
       {"9, 0", "burr slower, faster: 25 to 100 %", {burr_speed}},
       {"Tab", "wheel of tools: point or Up, Down; Tab, Enter or a click takes", {wheel}},

@@ -17,9 +17,8 @@ enum class Command {
   deeper,
   back,
   drill,
-  diameter,  // value: mm
-  cutting,
-  diamond,
+  diameter,   // value: mm
+  burr_kind,  // value: its place in kBurrKinds
   ball,
   cylinder,
   taper,
@@ -72,7 +71,7 @@ enum class Command {
   straight,      // the handle as the view holds it
   motion,        // value: 1 coarser, -1 finer
   burr_speed,    // value: 1 faster, -1 slower
-  other_burr,    // cutting or diamond
+  other_burr,    // of the next kind
   next_burr,     // value: 1 larger, -1 smaller
   hand_page,     // of the panel
   timeline,
@@ -99,8 +98,8 @@ struct Key {
 /// What a key does with these modifiers; where they mean nothing to it, what it does alone.
 [[nodiscard]] const Key* find_key(int code, int modifiers = 0);
 
-/// The first key that does it, as people call it: "F", "Space", "F10"; empty: none.
-[[nodiscard]] std::string key_name(Command command);
+/// The first key that does it (`value`: with this value), as people call it: "F", "Space", "F10"; empty: none.
+[[nodiscard]] std::string key_name(Command command, std::optional<int> value = {});
 /// Any key: "F", "Space", "keypad 5"; without a name its number, which has three digits.
 [[nodiscard]] std::string key_word(int code);
 

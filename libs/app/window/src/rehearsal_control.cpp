@@ -355,11 +355,8 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
     case Command::diameter:
       take_burr_of(press.value);
       return true;
-    case Command::cutting:
-      take_burr(BurrKind::cutting);
-      return true;
-    case Command::diamond:
-      take_burr(BurrKind::diamond);
+    case Command::burr_kind:
+      take_burr(static_cast<BurrKind>(press.value));
       return true;
     case Command::ball:
       take_burr(BurrShape::ball);
@@ -401,7 +398,7 @@ bool RehearsalControl::command(const Keyboard::Press& press, const std::optional
       set_burr_share(press.value);
       return true;
     case Command::other_burr:
-      take_burr(burr().kind == BurrKind::cutting ? BurrKind::diamond : BurrKind::cutting);
+      take_burr(static_cast<BurrKind>((static_cast<std::size_t>(burr().kind) + 1) % kBurrKinds.size()));
       return true;
     case Command::next_burr:
       next_burr(press.value);

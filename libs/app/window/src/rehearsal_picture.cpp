@@ -54,8 +54,10 @@ void RehearsalWindow::show() {
   show_tutor(now);
   show_instruments(now);
   tell_touch(now);
-  now.look([&](const World& world, SceneReaders&) { tools_->show(control_.tools(), tick, world); });
-  draw_saw_line(control_.tools(), scene.project, cuts_.scene(), ImGui::GetBackgroundDrawList());
+  now.look([&](const World& world, SceneReaders&) {
+    tools_->show(control_.tools(), tick, world, now.structures(), ImGui::GetTime());
+  });
+  draw_saw_line(control_.tools(), tools_->preview(), scene.project, cuts_.scene(), ImGui::GetBackgroundDrawList());
   control_.wash(keyboard_.held(Command::suck) || room_.holds(Command::suck), keyboard_.held(Command::wash) || room_.holds(Command::wash));
   note_camera(now);
   hints_.frame(scope_.view().eye_mm(), ImGui::GetTime());

@@ -86,11 +86,12 @@ bool Room::takes(const Keyboard::Press& press, RehearsalControl& control, const 
     }
     wheel_.close();
     if (takes_it && wheel_.chosen() >= 0) {
-      const Command chosen = wheel_items()[static_cast<std::size_t>(wheel_.chosen())].command;
+      const WheelItem& item = wheel_items()[static_cast<std::size_t>(wheel_.chosen())];
+      const Command chosen = item.command;
       // A burr is for the drill.
       const bool burr = chosen != Command::saw && chosen != Command::pieces && chosen != Command::plates && chosen != Command::put_away;
       if (burr && control.tools().tool() != HandTools::Tool::drill) pressed_.press(Command::put_away);
-      pressed_.press(chosen);
+      pressed_.press(chosen, item.value);
     }
     return takes_it || c == Command::put_away;
   }

@@ -5,14 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <vector>
 
 #include "ui_style.h"
 
 namespace osteo::inline app {
 namespace {
 
-std::string with_key(const char* word, Command command) {
-  return std::string(word) + " (" + key_name(command) + ")";
+std::string with_key(const char* word, Command command, std::optional<int> value = {}) {
+  return std::string(word) + " (" + key_name(command, value) + ")";
 }
 
 // A button that shows that its tool is in use: filled, and with a bar at its side, so not by colour alone.
@@ -108,28 +110,31 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
     const char* word;
     Command command;
     bool used, held;
+    std::optional<int> value = {};  // where one command has several buttons
   };
   const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
-  const Row rows[] = {{"help", Command::help, false, false},
-                      {"tools", Command::wheel, false, false},
-                      {"to bone", Command::bring, false, false},
-                      {"out", Command::lift, false, false},
-                      {"on, off", Command::drill, hand.latched, false},
-                      {"cutting", Command::cutting, hand.tool == 0 && !hand.saw && burr.kind == BurrKind::cutting, false},
-                      {"diamond", Command::diamond, hand.tool == 0 && !hand.saw && burr.kind == BurrKind::diamond, false},
-                      {"saw", Command::saw, hand.tool == 1 || hand.saw, false},
-                      {"pieces", Command::pieces, hand.tool == 2, false},
-                      {"plate", Command::plates, hand.tool == 3, false},
-                      {"suck", Command::suck, hand.sucking, true},
-                      {"water", Command::wash, hand.washing, true},
-                      {"undo", Command::undo, false, false},
-                      {"was", Command::before, hand.before, false},
-                      {"ruler", Command::ruler, hand.ruler, false},
-                      {"note", Command::mark, false, false},
-                      {"layout", Command::layout, false, false},
-                      {"end", Command::quit, false, false}};
+  std::vector<Row> rows{{"help", Command::help, false, false},
+                        {"tools", Command::wheel, false, false},
+                        {"to bone", Command::bring, false, false},
+                        {"out", Command::lift, false, false},
+                        {"on, off", Command::drill, hand.latched, false}};
+  for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
+    rows.push_back({kBurrKinds[n].name.data(), Command::burr_kind,
+                    hand.tool == 0 && !hand.saw && static_cast<std::size_t>(burr.kind) == n, false,
+                    static_cast<int>(n)});
+  rows.insert(rows.end(), {{"saw", Command::saw, hand.tool == 1 || hand.saw, false},
+                           {"pieces", Command::pieces, hand.tool == 2, false},
+                           {"plate", Command::plates, hand.tool == 3, false},
+                           {"suck", Command::suck, hand.sucking, true},
+                           {"water", Command::wash, hand.washing, true},
+                           {"undo", Command::undo, false, false},
+                           {"was", Command::before, hand.before, false},
+                           {"ruler", Command::ruler, hand.ruler, false},
+                           {"note", Command::mark, false, false},
+                           {"layout", Command::layout, false, false},
+                           {"end", Command::quit, false, false}});
   const float gap = ImGui::GetStyle().ItemSpacing.y;
-  const auto count = static_cast<float>(std::size(rows));
+  const auto count = static_cast<float>(rows.size());
   const float high = std::clamp(std::floor(ImGui::GetContentRegionAvail().y / count - gap), em() * 1.05F, em() * 2.5F);
   const float wide = ImGui::GetContentRegionAvail().x;
   ImDrawList* const draw = ImGui::GetWindowDrawList();
@@ -139,10 +144,10 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
     const ImVec2 at = ImGui::GetCursorScreenPos();
     const bool clicked = tool_button("##" + std::string(r.word), {wide, high}, r.used);
     if (r.held && ImGui::IsItemActive()) pressed.held.push_back(r.command);
-    if (clicked && !r.held) pressed.press(r.command);
+    if (clicked && !r.held) pressed.press(r.command, r.value.value_or(0));
     if (off) ImGui::EndDisabled();
     const Colour ink = off ? palette::kFaint : palette::kText;
-    const std::string key = key_name(r.command);
+    const std::string key = key_name(r.command, r.value);
     const float inner = wide - em() * 0.5F;
     if (high >= em() * 1.9F) {
       fitted_text(draw, {at.x + em() * 0.25F, at.y, inner, high * 0.56F}, em(), ink, r.word, true);
@@ -156,13 +161,14 @@ void draw_tray(const ScreenBox& box, const HandFacts& hand, Pressed& pressed) {
 
 void draw_burr(const HandFacts& hand, Pressed& pressed) {
   const Burr& burr = burr_library()[static_cast<std::size_t>(hand.burr)];
-  const float half = share_of_row(2);
-  const auto choice = [&](const char* word, Command command, bool used, float wide) {
-    if (tool_button(with_key(word, command), {wide, 0}, used)) pressed.press(command);
+  const auto choice = [&](const char* word, Command command, bool used, float wide, std::optional<int> value = {}) {
+    if (tool_button(with_key(word, command, value), {wide, 0}, used)) pressed.press(command, value.value_or(0));
   };
-  choice("cutting", Command::cutting, burr.kind == BurrKind::cutting, half);
-  ImGui::SameLine();
-  choice("diamond", Command::diamond, burr.kind == BurrKind::diamond, half);
+  for (std::size_t n = 0; n < kBurrKinds.size(); ++n) {
+    if (n % 2 == 1) ImGui::SameLine();
+    choice(kBurrKinds[n].name.data(), Command::burr_kind, static_cast<std::size_t>(burr.kind) == n, share_of_row(2),
+           static_cast<int>(n));
+  }
   const float third = share_of_row(3);
   choice("ball", Command::ball, burr.shape == BurrShape::ball, third);
   ImGui::SameLine();
@@ -258,7 +264,8 @@ void draw_wheel(const ToolWheel& wheel) {
     const float r = outer * 0.68F, wide = 4.4F * e;
     const ScreenBox box{middle.x + r * std::cos(angle) - wide / 2, middle.y + r * std::sin(angle) - e * 1.1F, wide, e * 1.2F};
     fitted_text(draw, box, e * (chosen ? 1.15F : 1), palette::kText, items[n].word, true);
-    fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, palette::kFaint, key_name(items[n].command), true);
+    fitted_text(draw, {box.x, box.bottom(), wide, e * 0.9F}, e * 0.8F, palette::kFaint,
+                key_name(items[n].command, items[n].value), true);
   }
   draw->AddCircle(middle, outer, im_colour32(palette::kFaint), 64, 1.5F);
   draw->AddCircleFilled(middle, inner, im_colour32(palette::kRaised), 32);

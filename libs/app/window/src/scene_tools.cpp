@@ -23,7 +23,8 @@ namespace {
 
 using Tool = HandTools::Tool;
 
-void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, std::array<char, 64>& plan_name) {
+void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, const CutPreview& preview,
+               std::array<char, 64>& plan_name) {
   SawCut cut = tools.cut();
   const auto slider = [](const char* name, double& mm, float least, float most, const char* format) {
     float value = static_cast<float>(mm);
@@ -43,6 +44,11 @@ void saw_panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view, std
   if (ImGui::Button("as I see it")) tools.aim_saw(view, false);
   ImGui::SameLine();
   if (ImGui::Button("flat")) tools.aim_saw(view, true);
+  if (!preview.text().empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, preview.cuts() ? im_colour(palette::kVermillion) : im_colour(palette::kText));
+    ImGui::TextWrapped("%s%s", preview.cuts() ? "! " : "", preview.text().c_str());
+    ImGui::PopStyleColor();
+  }
   if (ImGui::Button("Cut (Enter)", {-1, 0})) tools.perform(rehearsal);
   // By force and time, with this plane as the cutting guide.
   if (ImGui::Button("By hand, along this plane", {-1, 0})) tools.take_saw(rehearsal);
@@ -92,7 +98,9 @@ void tell_collision(double mm) {
 
 }  // namespace
 
-void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw) {
+void draw_saw_line(const HandTools& tools, const CutPreview& preview, const Project& project, const ScreenBox& area,
+                   ImDrawList* draw) {
+  const Colour colour = preview.cuts() ? palette::kVermillion : palette::kSkyBlue;
   if (tools.tool() != Tool::saw && !tools.saw_in_hand()) return;
   const SawCut& cut = tools.cut();
   const auto middle = project(cut.at_mm);
@@ -106,12 +114,19 @@ void draw_saw_line(const HandTools& tools, const Project& project, const ScreenB
       const auto end = project(cut.at_mm + normalized(cut.along) * (way * mm));
       if (!end) continue;
       draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, IM_COL32(0, 0, 0, 160), e / 4);
-      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, im_colour32(palette::kSkyBlue), e / 8);
+      draw->AddLine({(*middle)[0], (*middle)[1]}, {(*end)[0], (*end)[1]}, im_colour32(colour), e / 8);
       break;
     }
   }
   draw->AddCircleFilled({(*middle)[0], (*middle)[1]}, e * 0.35F, IM_COL32(0, 0, 0, 160));
-  draw->AddCircle({(*middle)[0], (*middle)[1]}, e * 0.35F, im_colour32(palette::kSkyBlue), 16, e / 8);
+  draw->AddCircle({(*middle)[0], (*middle)[1]}, e * 0.35F, im_colour32(colour), 16, e / 8);
+  if (preview.cuts()) {
+    const ImVec2 at{(*middle)[0] + e * 0.8F, (*middle)[1] - e * 0.5F},
+        wide = ImGui::CalcTextSize(preview.text().c_str());
+    draw->AddRectFilled({at.x - e * 0.25F, at.y}, {at.x + wide.x + e * 0.25F, at.y + wide.y}, IM_COL32(0, 0, 0, 190),
+                        e / 4);
+    draw->AddText(at, im_colour32(palette::kVermillion), preview.text().c_str());
+  }
   draw->PopClipRect();
 }
 
@@ -142,7 +157,7 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
     const bool held = tools.tool() == tool && !tools.saw_in_hand();
     if (ImGui::RadioButton(name, held) && !held) tools.choose(tool, rehearsal, view);
   }
-  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, plan_name_);
+  if (tools.tool() == Tool::saw) saw_panel(tools, rehearsal, view, preview_, plan_name_);
   if (tools.tool() == Tool::piece) piece_panel(tools, rehearsal);
   if (tools.tool() == Tool::plate) {
     plate_panel(tools, rehearsal);
@@ -172,10 +187,22 @@ void SceneTools::panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& v
   if (const std::string& note = tools.note(rehearsal); !note.empty()) ImGui::TextWrapped("%s", note.c_str());
 }
 
-void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world) {
+void SceneTools::show(const HandTools& tools, const TickRecord& tick, const World& world,
+                      const StructureMap* structures, double now_s) {
   const SawCut& cut = tools.cut();
   const bool shown = tools.tool() == Tool::saw || tools.saw_in_hand();
   plane_->SetVisibility(shown ? 1 : 0);
+  // By hand it cuts where it is led, as a burr does: the servo looks after that.
+  if (tools.tool() == Tool::saw) {
+    preview_.look(world, structures, cut, now_s);
+  } else {
+    preview_.clear();
+  }
+  if (preview_.cuts()) {
+    plane_->GetProperty()->SetColor(1.0, 0.3, 0.2);
+  } else {
+    plane_->GetProperty()->SetColor(0.35, 0.75, 1.0);
+  }
   if (shown) {
     const Vec3 n = normalized(cut.normal), along = normalized(cut.along - n * dot(n, cut.along)), across = cross(n, along);
     const double half_long = (cut.length_mm > 0 ? cut.length_mm : 1.4 * tools.size_mm()) / 2;

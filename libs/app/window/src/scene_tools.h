@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "cut_preview.h"
 #include "hand_tools.h"
 #include "osteo/display/view/plate_view.h"
 #include "room_layout.h"
@@ -19,8 +20,10 @@ namespace osteo::inline app {
 
 /// A point of the world in pixels of the window; nothing behind the eye.
 using Project = std::function<std::optional<std::array<float, 2>>(Vec3)>;
-/// The saw's line over the picture, within `area`: seen edge on its plane is as thin as the blade, and bone hides it. No-op without a saw.
-void draw_saw_line(const HandTools& tools, const Project& project, const ScreenBox& area, ImDrawList* draw);
+/// The saw's line over the picture, within `area`: seen edge on its plane is as thin as the blade, and bone hides it;
+/// red, with words, where it would cut a structure. No-op without a saw.
+void draw_saw_line(const HandTools& tools, const CutPreview& preview, const Project& project, const ScreenBox& area,
+                   ImDrawList* draw);
 
 class SceneTools {
  public:
@@ -33,7 +36,10 @@ class SceneTools {
   /// A section of the panel.
   void panel(HandTools& tools, Rehearsal& rehearsal, const ViewAxes& view);
   /// Cursors of the tools, before each frame.
-  void show(const HandTools& tools, const TickRecord& tick, const World& world);
+  void show(const HandTools& tools, const TickRecord& tick, const World& world, const StructureMap* structures,
+            double now_s);
+  /// What the saw would cut where it is now.
+  [[nodiscard]] const CutPreview& preview() const { return preview_; }
 
  private:
   vtkRenderer* renderer_;
@@ -41,6 +47,7 @@ class SceneTools {
   vtkSmartPointer<vtkPolyData> plane_data_;
   PlateView hand_plate_;
   double hand_in_bone_mm_ = 0;
+  CutPreview preview_;
   std::array<char, 64> plan_name_{};
 };
 

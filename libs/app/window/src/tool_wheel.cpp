@@ -2,14 +2,27 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
+
+#include "osteo/simulation/bone/burr_kind.h"
 
 namespace osteo::inline app {
 
 std::span<const WheelItem> wheel_items() {
-  static constexpr WheelItem kItems[] = {{"cutting", Command::cutting}, {"diamond", Command::diamond},   {"ball", Command::ball},
-                                         {"taper", Command::taper},     {"cylinder", Command::cylinder}, {"plate", Command::plates},
-                                         {"pieces", Command::pieces},   {"saw", Command::saw},           {"drill", Command::put_away}};
-  return kItems;
+  static const std::vector<WheelItem> items = [] {
+    std::vector<WheelItem> all;
+    for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
+      all.push_back({kBurrKinds[n].name.data(), Command::burr_kind, static_cast<int>(n)});
+    all.insert(all.end(), {{"ball", Command::ball},
+                           {"taper", Command::taper},
+                           {"cylinder", Command::cylinder},
+                           {"plate", Command::plates},
+                           {"pieces", Command::pieces},
+                           {"saw", Command::saw},
+                           {"drill", Command::put_away}});
+    return all;
+  }();
+  return items;
 }
 
 void ToolWheel::show(float x, float y) {

@@ -9,6 +9,7 @@ namespace osteo::inline app {
 struct WheelItem {
   const char* word;
   Command command;
+  int value = 0;
 };
 /// Clockwise from above.
 [[nodiscard]] std::span<const WheelItem> wheel_items();

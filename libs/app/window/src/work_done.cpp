@@ -1,5 +1,6 @@
 #include "work_done.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "osteo/simulation/bone/instrument.h"
@@ -29,6 +30,12 @@ void WorkDone::tick(const TickRecord& record, std::span<const VoxelChange>) {
   tool.removed_mm3 += static_cast<double>(record.removed_mm3);
 }
 
+void SessionFacts::add_cut(const std::string& structure, double mm3) {
+  auto at = std::find_if(structures.begin(), structures.end(), [&](const Structure& s) { return s.name == structure; });
+  if (at == structures.end()) at = structures.insert(structures.end(), {structure});
+  at->cut_mm3 += mm3;
+}
+
 EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   EndFacts out;
   const auto add = [&](std::string what, std::string value, Nearness nearness = Nearness::unknown) {
@@ -48,11 +55,14 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   for (const std::string& p : session.plates) add("plate", p);
   if (session.has_structures && session.structures.empty()) add("structures at risk", "none came near", Nearness::far);
   for (const SessionFacts::Structure& s : session.structures) {
+    if (s.cut_mm3 > 0) {
+      add(s.name, text_of("INJURED: cut through by the saw, %.2g mm3 of it", s.cut_mm3), Nearness::touched);
+    }
     if (s.injured_s > 0) {
       add(s.name, text_of("INJURED: touched by the turning burr for %.2f s", s.injured_s), Nearness::touched);
     } else if (s.touched_s > 0) {
       add(s.name, text_of("touched for %.2f s, drill off", s.touched_s), Nearness::close);
-    } else {
+    } else if (s.cut_mm3 <= 0) {
       add(s.name, text_of("never nearer than %.1f mm", s.least_clearance_mm),
           s.least_clearance_mm < StateFacts::kNearMm ? Nearness::near : Nearness::far);
     }

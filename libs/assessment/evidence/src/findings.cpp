@@ -159,16 +159,25 @@ class Finder {
       const double injured = value("injured_s", name).value_or(0), touched = value("touched_s", name).value_or(0);
       if (const auto c = value("clearance_mm", name); c && *c < nearest.second) nearest = {name, *c};
       if (injured > 0) {
-        const auto count =
-            static_cast<double>(std::count_if(score_.moments.begin(), score_.moments.end(), [&, &of = name](const Moment& m) {
-              return m.what == "reached by a turning burr" && m.structure == of;
-            }));
-        ScoreFinding& f = add(
-            "injury", name, FindingSeverity::serious,
-            "A turning burr reached the " + name + (count > 0 ? " " + times(count) : "") + ", for " + told_seconds(injured) + " in all.",
-            "Reached: the burr's surface lay inside the structure's face.");
+        const auto count = static_cast<double>(std::count_if(
+            score_.moments.begin(), score_.moments.end(),
+            [&, &of = name](const Moment& m) { return m.what.starts_with("reached by") && m.structure == of; }));
+        const bool sawn = std::any_of(score_.moments.begin(), score_.moments.end(), [&, &of = name](const Moment& m) {
+          return m.what == "reached by the running saw" && m.structure == of;
+        });
+        const bool burred = std::any_of(score_.moments.begin(), score_.moments.end(), [&, &of = name](const Moment& m) {
+          return m.what == "reached by a turning burr" && m.structure == of;
+        });
+        ScoreFinding& f = add("injury", name, FindingSeverity::serious,
+                              std::string(!sawn    ? "A turning burr"
+                                          : burred ? "A turning burr and the running saw"
+                                                   : "The running saw") +
+                                  " reached the " + name + (count > 0 ? " " + times(count) : "") + ", for " +
+                                  told_seconds(injured) + " in all.",
+                              "Reached: its surface lay inside the structure's face.");
         from(f, "injured_s", name, injured, 0);
         moments(f, "reached by a turning burr", name);
+        moments(f, "reached by the running saw", name);
       } else if (n > 0) {
         ScoreFinding& f = add("touch", name, FindingSeverity::caution,
                               "The burr touched the " + name + " " + times(n) + ", for " + told_seconds(touched) + ", without turning.");
@@ -176,17 +185,43 @@ class Finder {
         moments(f, "touched from the first tick on", name);
       }
     }
+    bool cut = false;
+    for (const auto& [name, mm3] : values("cut_mm3")) {
+      any = true;
+      if (mm3 <= 0) continue;
+      cut = true;
+      ScoreFinding& f = add("cut", name, FindingSeverity::serious,
+                            "The saw cut through the " + name + ": " + in(mm3, "mm3") + " of it.",
+                            "Cut through: it lay in the path of the blade, as far as that was in bone.");
+      f.kind = "injury";
+      from(f, "cut_mm3", name, mm3, 0);
+      moments(f, SawCutMetric::kMoment, name);
+    }
+    std::pair<std::string, double> by_saw{"", 1e9};
+    for (const auto& [name, mm] : values("saw_clearance_mm")) {
+      if (mm < by_saw.second) by_saw = {name, mm};
+      if (mm >= limits_.near_miss_mm) continue;
+      ScoreFinding& f = add("saw-clearance", name, FindingSeverity::note,
+                            "The saw's cut passed the " + name + " at " + in(mm, "mm") + ".",
+                            "Told below " + told_number(limits_.near_miss_mm) + " mm.");
+      f.kind = "clearance";
+      from(f, "saw_clearance_mm", name, mm, limits_.near_miss_mm);
+    }
     for (const auto& [name, c] : values("clearance_mm")) {
       if (c <= 0 || c >= limits_.near_miss_mm || value("touches", name).value_or(0) > 0) continue;
       ScoreFinding& f = add("clearance", name, FindingSeverity::note, "The burr came within " + in(c, "mm") + " of the " + name + ".",
                             "Told below " + told_number(limits_.near_miss_mm) + " mm.");
       from(f, "clearance_mm", name, c, limits_.near_miss_mm);
     }
-    if (any && nearest.second > 0) {
+    if (any && nearest.second > 0 && !cut) {
+      const std::string saw =
+          by_saw.second < 1e8 ? " The saw's cuts passed the " + by_saw.first + " at " + in(by_saw.second, "mm") + "."
+                              : "";
       ScoreFinding& f = add("untouched", {}, FindingSeverity::good,
-                            nearest.second < 1e8 ? "No structure was touched; the burr came nearest to the " + nearest.first + ", at " +
-                                                       in(nearest.second, "mm") + "."
-                                                 : "No structure was touched, and no burr came near one.");
+                            (nearest.second < 1e8 ? "No structure was touched; the burr came nearest to the " +
+                                                        nearest.first + ", at " + in(nearest.second, "mm") + "."
+                                                  : "No structure was touched, and no burr came near one.") +
+                                saw);
       f.kind = "touch";
       if (nearest.second < 1e8) from(f, "clearance_mm", nearest.first, nearest.second, std::nullopt);
     }
@@ -343,7 +378,7 @@ class Finder {
         return tell(r.value) + " of it is laid open, at least " + tell(r.threshold) + " is asked";
       case ItemKind::not_violated:
         if (r.value > 0) return tell(r.value) + " of it is gone";
-        return r.pass ? "none of it is gone" : "none of it is gone, but a turning burr reached into it";
+        return r.pass ? "none of it is gone" : "none of it is gone, but a running burr or saw reached into it";
       case ItemKind::no_hole:
         return "the largest bare part has " + tell(r.value) + ", below " + tell(r.threshold) + " is asked";
       case ItemKind::no_cells_left:

@@ -95,7 +95,7 @@ bool HintWatch::holds(const HintRule& rule, const TickRecord& t) const {
     case HintKind::large_burr:
       return burr->diameter_mm > rule.limit;
     case HintKind::cutting_burr:
-      return burr->kind != BurrKind::diamond;
+      return !row_of(burr->kind).near_structures;
     case HintKind::dry:
       return water_ && !water_flows_ && !poured_;
   }

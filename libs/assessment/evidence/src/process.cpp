@@ -256,7 +256,8 @@ void NearMetric::frame(const EvidenceFrame& f) {
         if (each_[s] >= r.within_mm || scene_.structures->name_of(names[s]) != r.structure) continue;
         ruled = true;
         const Burr& burr = *tool.cutter();
-        allowed = allowed && burr.diameter_mm <= r.most_diameter_mm + 1e-9 && !(r.diamond_only && burr.kind == BurrKind::cutting);
+        allowed = allowed && burr.diameter_mm <= r.most_diameter_mm + 1e-9 &&
+                  !(r.diamond_only && !row_of(burr.kind).near_structures);
       }
     }
     if (ruled) {

@@ -31,7 +31,7 @@ void Product::violated(const ScaleItem& item, std::uint8_t s, const std::vector<
   if (r.pass && r.value == 0) r.margin = std::max(1.0, r.margin);
   if (!r.pass) r.margin = std::min(-1.0, r.margin);
   if (reached) {
-    r.word = "a turning burr reached into it";
+    r.word = "a running burr or saw reached into it";
   } else {
     settle(r, perhaps <= item.threshold, surely <= item.threshold);
   }

@@ -11,12 +11,14 @@
 
 namespace osteo::inline assessment {
 
-ScoreKeeper::ScoreKeeper(const EvidenceScene& scene) : scene_(scene), process_(scene), near_(scene), visibility_(scene) {}
+ScoreKeeper::ScoreKeeper(const EvidenceScene& scene)
+    : scene_(scene), process_(scene), near_(scene), visibility_(scene), saw_cuts_(scene) {}
 
 void ScoreKeeper::frame(const EvidenceFrame& f) {
   process_.frame(f);
   near_.frame(f);
   visibility_.frame(f);
+  saw_cuts_.frame(f);
   for (const auto& changes : {f.changes, f.sawn}) {
     for (const VoxelChange& c : changes) {
       if (c.before < kSolid || c.density >= kSolid) continue;
@@ -37,6 +39,7 @@ void ScoreKeeper::finish(const World& end) {
   });
   process_.finish(end, values_, moments_);
   near_.finish(end, values_, moments_);
+  saw_cuts_.finish(end, values_, moments_);
   visibility_.finish(end, values_, moments_);
   std::stable_sort(moments_.begin(), moments_.end(), [](const Moment& a, const Moment& b) { return a.t_s < b.t_s; });
 }
@@ -193,7 +196,7 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
   for (const auto& [name, voxel] : keeper.removed()) removed.push_back(voxel);
   std::vector<std::string> injured;
   for (const Measured& m : keeper.values()) {
-    if (m.row->name == "injured_s" && m.value && *m.value > 0) injured.push_back(m.of);
+    if ((m.row->name == "injured_s" || m.row->name == "cut_mm3") && m.value && *m.value > 0) injured.push_back(m.of);
   }
   const Product product(begin, end, *structures, procedure, std::move(removed), context);
   if (!product.word().empty()) score.words.push_back(product.word());

@@ -195,7 +195,7 @@ void run_vibration(const RunAll& run) {
                     {}};
   double worst = 0;
   const VibrationSpectrum& spectrum = default_vibration();
-  for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond})
+  for (std::size_t index = 0; index < kBurrKinds.size(); ++index)
     for (const double pressed : {0.0, 1.0, 3.0})
       for (const double speed : {1.0, 0.5}) {
         double most = 0;
@@ -203,9 +203,10 @@ void run_vibration(const RunAll& run) {
         for (const double rate : {1000.0, 2000.0, 5000.0}) {
           Vibration v(spectrum);
           std::vector<double> signal;
-          for (int i = 0; i < static_cast<int>(8 * rate); ++i) signal.push_back(v.step(kind, pressed, 1 / rate, speed)[0]);
+          for (int i = 0; i < static_cast<int>(8 * rate); ++i)
+            signal.push_back(v.step(static_cast<BurrKind>(index), pressed, 1 / rate, speed)[0]);
           peaks = 0;
-          for (const auto& peak : spectrum.by_kind[static_cast<std::size_t>(kind)]) {
+          for (const auto& peak : spectrum.by_kind[index]) {
             const double hz = speed * peak.frequency_hz, due = speed * (peak.idle_n + peak.per_n * pressed);
             if (hz >= 500 || hz / rate > 0.45) continue;
             ++peaks;
@@ -213,8 +214,8 @@ void run_vibration(const RunAll& run) {
           }
         }
         worst = std::max(worst, most);
-        table.cells.push_back({std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]), digits(pressed, 2),
-                               digits(speed, 2), std::to_string(peaks), fixed(most, 3)});
+        table.cells.push_back({std::string(kBurrKinds[index].name), digits(pressed, 2), digits(speed, 2),
+                               std::to_string(peaks), fixed(most, 3)});
       }
   run.result.bars.push_back({"vibration of the drill against its file, below 500 Hz", "1 dB", fixed(worst, 3) + " dB", worst <= 1});
   run.result.tables.push_back(std::move(table));

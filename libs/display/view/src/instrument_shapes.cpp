@@ -144,16 +144,16 @@ void blade(Rings& rings, const RoundCone& head) {
 }  // namespace
 
 int flutes_of(const Burr& burr) {
-  if (burr.kind == BurrKind::diamond) return 0;
-  return burr.diameter_mm < 3 ? 6 : burr.diameter_mm < 5 ? 8 : 10;
+  return row_of(burr.kind).flutes[burr.diameter_mm < 3 ? 0 : burr.diameter_mm < 5 ? 1 : 2];
 }
 
 vtkSmartPointer<vtkPolyData> burr_surface(const Burr& burr, double sharp) {
   const RoundCone head = burr.head();
   const int flutes = flutes_of(burr), around = flutes > 0 ? 12 * flutes : 72;
   constexpr double kDepth = 0.17, kTwist = 0.22;  // of the radius; turns from tip to end
-  constexpr Colour kEdge{0.86, 0.87, 0.88}, kGroove{0.30, 0.31, 0.34}, kCutting{0.62, 0.63, 0.65};
-  constexpr Colour kGrit{0.80, 0.78, 0.70}, kBond{0.52, 0.50, 0.44}, kDiamond{0.68, 0.66, 0.59};
+  const auto colour = [](const std::array<double, 3>& c) { return Colour{c[0], c[1], c[2]}; };
+  const BurrKindRow& kind = row_of(burr.kind);
+  const Colour raised = colour(kind.raised), sunk = colour(kind.sunk), afar = colour(kind.colour);
   Rings rings(around);
   const std::vector<Place> places = profile(head, 12);
   for (std::size_t n = 0; n < places.size(); ++n) {
@@ -169,10 +169,7 @@ vtkSmartPointer<vtkPolyData> burr_surface(const Burr& burr, double sharp) {
           const double r = p.radius * (1 - sharp * cut);
           return Vec3{r * std::cos(angle), r * std::sin(angle), p.z};
         },
-        [&](double angle) {
-          return flutes > 0 ? mix(kCutting, mix(kEdge, kGroove, groove(angle)), sharp)
-                            : mix(kDiamond, mix(kGrit, kBond, speck(angle)), sharp);
-        });
+        [&](double angle) { return mix(afar, mix(raised, sunk, flutes > 0 ? groove(angle) : speck(angle)), sharp); });
   }
   return rings.done(flutes > 0 ? 40 : 80);
 }

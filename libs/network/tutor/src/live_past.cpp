@@ -68,6 +68,12 @@ SessionHeader settings_of(const Bytes& bytes) {
   if (!reader.outline().not_replayable.empty())
     throw Error(ExitCode::corrupt, "the host's session cannot be followed by this version: " + reader.outline().not_replayable,
                 "both need the same version");
+  // What comes live is not read from a file: its numbers are the host's.
+  if (!reader.outline().numbered_alike)
+    throw Error(
+        ExitCode::corrupt,
+        "the host's session cannot be followed by this version: its library of instruments or plates is another",
+        "both need the same version");
   return reader.header();
 }
 
@@ -77,14 +83,7 @@ Bytes past_of(const Bytes& settings) {
 }
 
 Bytes past_bytes(const SessionFolder& session) {
-  std::vector<std::pair<SessionFolder, double>> chain;  // the last first; 0: to its end
-  for (SessionFolder s = session; !s.resumed_from.empty();) {
-    const double until_s = s.resumed_at_s;
-    if (chain.size() > 1000)
-      throw Error(ExitCode::corrupt, "the sessions go on from each other in a circle", "mend resumed_from in session.json");
-    s = open_session_folder(s.resumed_from, s.case_folder);
-    chain.emplace_back(s, until_s);
-  }
+  const std::vector<SessionBefore> chain = sessions_before(session);
   Bytes bytes;
   std::optional<SessionWriter> writer;
   SessionBatch batch;
@@ -94,8 +93,8 @@ Bytes past_bytes(const SessionFolder& session) {
     if (bytes.size() > kMostPastBytes)
       throw Error(ExitCode::failed, "the sessions that this one goes on from are too long to be sent", "begin with the case's bone");
   };
-  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
-    const SessionReader reader(link->first.stream());
+  for (const SessionBefore& before : chain) {
+    const SessionReader reader(before.session.stream());
     if (!reader.outline().gaps.empty())
       throw Error(ExitCode::failed, "a session that this one goes on from lacks ticks", "begin with the case's bone");
     if (!writer) {
@@ -104,8 +103,9 @@ Bytes past_bytes(const SessionFolder& session) {
       writer.emplace(std::make_unique<MemorySink>(bytes), header);
     }
     std::uint64_t reached = 0;
-    auto parts = link->second > 0
-                     ? reader.scene_at(static_cast<std::uint64_t>(std::llround(link->second * reader.header().rate_hz)), reached)
+    auto parts = before.until_s > 0
+                     ? reader.scene_at(
+                           static_cast<std::uint64_t>(std::llround(before.until_s * reader.header().rate_hz)), reached)
                      : reader.parts();
     while (const SessionPart* const part = parts.next()) {
       if (!part->actions.empty() && !batch.changes.empty()) flush();

@@ -332,7 +332,7 @@ std::string script_json(const Script& script) {
   ordered_json j;
   j["osteotome_strokes"] = 1;
   if (const Burr* const burr = held.as_burr()) {
-    j["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(burr->kind)]},
+    j["burr"] = {{"kind", row_of(burr->kind).name},
                  {"diameter_mm", burr->diameter_mm},
                  {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(burr->shape)]}};
   } else {

@@ -59,8 +59,8 @@ ordered_json haptics_json(const HapticSetup& h) {
   return j;
 }
 
-// What this build does not know goes into `unknown`.
-HapticSetup setup_of(const ordered_json& j, std::vector<std::string>& unknown) {
+// What this build does not know goes into `unknown`; `tools`: what the file's instruments are here.
+HapticSetup setup_of(const ordered_json& j, const NamedNumbers& tools, std::vector<std::string>& unknown) {
   HapticSetup h;
   const auto fields = fields_of<HapticsParams>(h.params);
   for (const auto& [key, value] : j.at("params").items()) {
@@ -86,7 +86,9 @@ HapticSetup setup_of(const ordered_json& j, std::vector<std::string>& unknown) {
     if (method < 0 || method >= static_cast<int>(EnumNames<ContactMethod>::values.size()))
       unknown.push_back("method of contact " + std::to_string(method));
     else
-      h.tool_methods[t.at(0)] = static_cast<ContactMethod>(method);
+      // Of an instrument that is none here no record can be read.
+      if (const int here = tools.here_or_none(t.at(0)); here >= 0)
+        h.tool_methods[here] = static_cast<ContactMethod>(method);
   }
   h.hardness = j.at("hardness").get<bool>();
   h.hardness_json = j.at("hardness_law");
@@ -111,7 +113,7 @@ ordered_json instruments_json() {
                      {"head", shape(i.head)},
                      {"shaft", shape(i.shaft)}};
     if (const Burr* const b = i.cutter()) {
-      one["burr"] = {{"kind", EnumNames<BurrKind>::values[static_cast<std::size_t>(b->kind)]},
+      one["burr"] = {{"kind", row_of(b->kind).name},
                      {"shape", EnumNames<BurrShape>::values[static_cast<std::size_t>(b->shape)]},
                      {"diameter_mm", b->diameter_mm},
                      {"rate_mm3_per_s_per_n", b->rate_mm3_per_s_per_n},
@@ -139,6 +141,18 @@ ordered_json plates_json() {
                  {"holes_mm", holes}});
   }
   return j;
+}
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& library) {
+  std::vector<std::string> names;
+  for (const T& one : library) names.push_back(one.name);
+  return names;
+}
+std::vector<std::string> names_in(const ordered_json& list) {
+  std::vector<std::string> names;
+  for (const auto& one : list) names.push_back(one.at("name"));
+  return names;
 }
 
 FieldType type_of(const std::string& text, const std::string& name) {
@@ -198,6 +212,34 @@ FileTable table_of(const std::string& kind, const ordered_json& j, const std::st
 
 }  // namespace
 
+NamedNumbers::NamedNumbers(std::string what, std::vector<std::string> names, const std::vector<std::string>& here)
+    : what_(std::move(what)), names_(std::move(names)) {
+  for (std::size_t n = 0; n < names_.size(); ++n) {
+    const auto at = std::find(here.begin(), here.end(), names_[n]);
+    here_.push_back(at == here.end() ? -1 : static_cast<int>(at - here.begin()));
+    all_known_ = all_known_ && here_.back() >= 0;
+    same_ = same_ && (here_.back() < 0 || here_.back() == static_cast<int>(n));
+  }
+  // A number behind the last is the last: where that is another one here, numbers are not their own.
+  same_ = same_ && (names_.empty() || names_.size() == here.size());
+}
+
+int NamedNumbers::here_or_none(std::uint32_t number) const {
+  if (here_.empty()) return static_cast<int>(number);
+  return here_[std::min<std::size_t>(number, here_.size() - 1)];
+}
+
+std::uint32_t NamedNumbers::operator()(std::uint32_t number, const std::string& file) const {
+  if (here_.empty() || (same_ && all_known_)) return number;
+  const int here = here_or_none(number);
+  if (here < 0)
+    throw Error(ExitCode::corrupt,
+                file + " was recorded with the " + what_ + " '" +
+                    names_[std::min<std::size_t>(number, names_.size() - 1)] + "', which this version does not know",
+                "a later version may have recorded it; use that");
+  return static_cast<std::uint32_t>(here);
+}
+
 std::string header_json(const SessionHeader& h) {
   ordered_json j;
   j["osteotome_session"] = kSessionFormat;
@@ -219,7 +261,8 @@ std::string header_json(const SessionHeader& h) {
   return j.dump();
 }
 
-void read_header(std::string_view text, const std::string& name, SessionOutline& o, std::vector<FileTable>& tables) {
+void read_header(std::string_view text, const std::string& name, SessionOutline& o, std::vector<FileTable>& tables,
+                 FileNumbers& numbers) {
   const auto j = ordered_json::parse(text);
   if (!j.contains("osteotome_session")) throw Error(ExitCode::corrupt, name + " is not a session of this program");
   SessionHeader& h = o.header;
@@ -255,9 +298,13 @@ void read_header(std::string_view text, const std::string& name, SessionOutline&
     }
   }
   for (const auto& [kind, action] : j.at("actions").items()) o.action_names[static_cast<std::uint32_t>(std::stoul(kind))] = action;
-  for (const auto& i : j.at("instruments")) o.tools.push_back(i.at("name"));
+  o.tools = names_of(instrument_library());
+  o.plates = names_of(plate_library());
+  numbers.tools = NamedNumbers("instrument", names_in(j.at("instruments")), o.tools);
+  numbers.plates = NamedNumbers("plate", names_in(j.value("plates", ordered_json::array())), o.plates);
+  o.numbered_alike = numbers.tools.same() && numbers.plates.same();
   std::vector<std::string> unknown;
-  h.haptics = setup_of(j.at("haptics"), unknown);
+  h.haptics = setup_of(j.at("haptics"), numbers.tools, unknown);
   if (j.at("hands") != h.haptics.hands()) throw Error(ExitCode::corrupt, name + " does not tell of a device for each hand");
   if (h.haptics.hands() > kMostHands) say_not_replayable(o, "it has " + std::to_string(h.haptics.hands()) + " hands");
   for (const auto& [setting, value] : j.at("haptics").at("params").items()) o.setting_names.push_back(setting);

@@ -152,6 +152,7 @@ struct SessionReader::File {
   Bytes bytes;
   SessionOutline outline;
   std::vector<FileTable> tables;
+  FileNumbers numbers;
   std::vector<Entry> entries;
   std::map<std::uint32_t, std::uint64_t> unknown_frames;
   // While looking through.
@@ -224,7 +225,7 @@ void SessionReader::File::look_through() {
   }
   std::uint64_t at = sizeof head + head.bytes;
   try {
-    read_header(text_of(payload), name, outline, tables);
+    read_header(text_of(payload), name, outline, tables, numbers);
     while (at < bytes.size()) {
       if (frame_at(bytes, at, head, payload)) {
         take(at, head, payload);
@@ -325,7 +326,8 @@ bool SessionReader::Parts::State::next_of_frame() {
     if (table->part == tick_table().part) {
       if (scene_only) continue;
       read(ticks);
-      for (const TickRecord& t : ticks) {
+      for (TickRecord& t : ticks) {
+        t.device.tool = static_cast<std::uint8_t>(file.numbers.tools(t.device.tool, file.name));
         if (t.tick != next_tick || t.hand != hand || t.tick >= entry->end_tick) file.broken(*entry, "tick " + std::to_string(next_tick) + " is missing");
         if (++hand == file.outline.header.haptics.hands()) {
           hand = 0;
@@ -339,6 +341,9 @@ bool SessionReader::Parts::State::next_of_frame() {
     } else if (table->part == action_record_table().part) {
       read(actions);
       for (SceneAction& a : actions) {
+        // What is fixed or taken by hand is a plate of the library; other items are numbers of the scene.
+        if ((a.is(ActionKind::grip) || a.is(ActionKind::attach)) && a.item != SceneAction::kNobody)
+          a.item = file.numbers.plates(a.item, file.name);
         if (!a.is(ActionKind::setting)) continue;
         const auto& names = file.outline.setting_names;
         const int here = a.item < names.size() ? setting_number(names[a.item]) : -1;

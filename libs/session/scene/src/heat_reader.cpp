@@ -219,7 +219,9 @@ void HeatReader::heat(const TickRecord& record) {
   const bool saw = held.kind == InstrumentKind::saw;
   const double way_mm = saw ? 2 * kStrokeMm * held.speed_share : std::numbers::pi * edge->diameter_mm;
   const double speed_ms = way_mm * static_cast<double>(record.speed_rpm) * kMsPerMinuteAndMm;
-  const double watt = edge->kind == BurrKind::cutting ? params_.cutting_share * press_n * speed_ms : params_.diamond_w_per_n * press_n;
+  const BurrKindRow& kind = row_of(edge->kind);
+  const double watt = kind.heat_by_work * params_.cutting_share * press_n * speed_ms +
+                      kind.heat_by_force * params_.diamond_w_per_n * press_n;
   // Bone pushes the hand away from where it is pressed.
   const Vec3 force = from_floats(record.force_n);
   const double radius = held.head.start_radius_mm;

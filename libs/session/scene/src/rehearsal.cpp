@@ -156,6 +156,7 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
   const bool other_bone = !effect.changed.empty() || !effect.made.empty() || !effect.gone.empty();
   if (options_.follow.pieces && other_bone) pieces_ = static_cast<int>(readers_->large_pieces().size());
   if (live) scene.unlock();
+  if (action.is(ActionKind::saw) && effect.done) look_at_cut(action, effect);
   if (!effect.message.empty() && !row_of(action).made_often) {
     const std::lock_guard lock(queue_mutex_);
     const auto kind = static_cast<ActionKind>(action.kind);
@@ -167,6 +168,25 @@ bool Rehearsal::perform(const SceneAction& action, bool live) {
     }
   }
   return true;
+}
+
+// What a saw by its plane took of structures: the servo, which looks after touches, knows nothing of it. In the thread
+// that changes the scene, so that bodies stay where they are meanwhile.
+void Rehearsal::look_at_cut(const SceneAction& action, const World::Effect& effect) {
+  if (structures() == nullptr) return;
+  std::vector<VoxelKey> voxels;
+  voxels.reserve(effect.dust.size());
+  for (const auto& [name, density] : effect.dust) voxels.push_back(name);
+  const std::optional<SawCut> blade = blade_at_work(operation_.world(), action.saw_cut(), voxels);
+  if (!blade) return;
+  const std::vector<StructureCut> cuts = structures_cut(*structures(), *blade);
+  const std::string told = told_structures_cut(*structures(), cuts);
+  if (told.empty()) return;
+  const std::lock_guard lock(queue_mutex_);
+  for (const StructureCut& c : cuts) {
+    if (c.mm3 > 0) structure_cuts_.push_back({operation_.ticks(), c});
+  }
+  refused_ = "the saw cut through " + told;
 }
 
 // Soft tissue a hundredth of a second further, where the tools are now.
@@ -384,6 +404,7 @@ RehearsalSummary Rehearsal::finish() {
   s.fixtures = operation_.world().fixtures();
   s.structures = operation_.renderer().structure_events();
   s.notes = notes_;
+  s.structure_cuts = structure_cuts_;
   s.unusable_poses = readers_->tools.unusable_poses();
   if (loop_) s.loop = loop_->stats();
   for (const std::uint8_t tool : readers_->tools.burrs_used()) {

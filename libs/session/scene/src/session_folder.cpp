@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
 
 #include "osteo/core/base/error.h"
 #include "osteo/core/base/files.h"
@@ -86,19 +88,31 @@ World world_of(const Case& the_case, const Anatomy& anatomy) {
   return world;
 }
 
-World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
-  if (session.resumed_from.empty()) return world_of(the_case, anatomy);
-  const SessionFolder before = open_session_folder(session.resumed_from, session.case_folder);
-  if (session.resumed_at_s > 0) return world_at(before, session.resumed_at_s, the_case, anatomy, context);
-  return world_at_end(before, the_case, anatomy, context);
+std::vector<SessionBefore> sessions_before(const SessionFolder& session) {
+  std::vector<SessionBefore> chain;
+  // Folders are compared as what they are, whatever way leads to them.
+  const auto place = [](const fs::path& folder) { return fs::weakly_canonical(folder); };
+  std::set<fs::path> seen{place(session.folder)};
+  for (SessionFolder s = session; !s.resumed_from.empty();) {
+    const double until_s = s.resumed_at_s;
+    const fs::path from = s.folder;
+    s = open_session_folder(s.resumed_from, s.case_folder);
+    if (!seen.insert(place(s.folder)).second)
+      throw Error(ExitCode::corrupt,
+                  "the sessions resume from each other in a circle: '" + from.string() + "' leads back to '" +
+                      s.folder.string() + "'",
+                  "correct \"resumed_from\" in '" + (from / "session.json").string() +
+                      "', or take it out if that began with the case");
+    chain.push_back({s, until_s});
+  }
+  std::reverse(chain.begin(), chain.end());
+  return chain;
 }
 
 namespace {
 
-// An open session and the scene at its beginning.
-std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy,
-                                         const Context& context) {
-  World world = world_at_begin(session, the_case, anatomy, context);
+// An open session, and the scene at its beginning as it was recorded on it.
+SessionReader begin_of(const SessionFolder& session, const World& world, const Context& context) {
   SessionReader recorded(session.stream());
   const std::string name = "the session '" + session.folder.string() + "'";
   if (world.hash() != recorded.header().bone_hash) {
@@ -107,13 +121,11 @@ std::pair<SessionReader, World> begin_of(const SessionFolder& session, const Cas
   }
   for (const std::string& line : losses(recorded.outline())) context.warn(name + ": " + line);
   for (const std::string& line : recorded.outline().newer) context.warn(name + " is of a later version: left out " + line);
-  return {std::move(recorded), std::move(world)};
+  return recorded;
 }
 
-}  // namespace
-
-World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy, const Context& context) {
-  auto [recorded, world] = begin_of(session, the_case, anatomy, context);
+World until_time(const SessionFolder& session, double t_s, World world, const Context& context) {
+  const SessionReader recorded = begin_of(session, world, context);
   const double rate_hz = recorded.header().rate_hz;
   const auto tick = static_cast<std::uint64_t>(std::llround(t_s * rate_hz));
   if (const std::uint64_t reached = apply_recorded_until(recorded, world, tick); reached < tick)
@@ -121,11 +133,11 @@ World world_at(const SessionFolder& session, double t_s, const Case& the_case, c
                 "the session '" + session.folder.string() + "' lasts " + format_number(static_cast<double>(reached) / rate_hz) +
                     " s, not " + format_number(t_s) + " s",
                 "ask for a time within it, or for none: its end");
-  return std::move(world);
+  return world;
 }
 
-World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
-  auto [recorded, world] = begin_of(session, the_case, anatomy, context);
+World until_end(const SessionFolder& session, World world, const Context& context) {
+  const SessionReader recorded = begin_of(session, world, context);
   const SessionOutline& o = recorded.outline();
   const auto lost = std::find_if(o.gaps.begin(), o.gaps.end(), [](const Gap& g) { return g.bone_lost; });
   if (lost == o.gaps.end()) {
@@ -133,13 +145,13 @@ World world_at_end(const SessionFolder& session, const Case& the_case, const Ana
     if (o.end && !o.end->bone_hash.empty() && world.hash() != o.end->bone_hash) {
       throw Error(ExitCode::corrupt, "the changes recorded in '" + session.folder.string() + "' do not give the bone it ended with");
     }
-    return std::move(world);
+    return world;
   }
   // All bone was written once more at the end, if the session came to one.
   World before = world.copy();
   try {
     apply_recorded(recorded, world);
-    if (o.end && world.hash() == o.end->bone_hash) return std::move(world);
+    if (o.end && world.hash() == o.end->bone_hash) return world;
   } catch (const Error&) {
     // It changes voxels of pieces that came to be while nothing was recorded.
   }
@@ -147,6 +159,29 @@ World world_at_end(const SessionFolder& session, const Case& the_case, const Ana
                " on cannot be used; the bone is as it was before");
   apply_recorded_until(recorded, before, lost->first_tick);
   return before;
+}
+
+}  // namespace
+
+World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy,
+                     const Context& context) {
+  // Looked through before any of them is read, and one after the other: as long a chain as the disk holds.
+  const std::vector<SessionBefore> chain = sessions_before(session);
+  World world = world_of(the_case, anatomy);
+  for (const SessionBefore& before : chain) {
+    world = before.until_s > 0 ? until_time(before.session, before.until_s, std::move(world), context)
+                               : until_end(before.session, std::move(world), context);
+  }
+  return world;
+}
+
+World world_at(const SessionFolder& session, double t_s, const Case& the_case, const Anatomy& anatomy,
+               const Context& context) {
+  return until_time(session, t_s, world_at_begin(session, the_case, anatomy, context), context);
+}
+
+World world_at_end(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context) {
+  return until_end(session, world_at_begin(session, the_case, anatomy, context), context);
 }
 
 void apply_haptic_settings(const fs::path& case_folder, const fs::path& file, HapticSetup& setup) {
@@ -291,6 +326,16 @@ std::string write_summary(const SessionFolder& session, const RehearsalSummary& 
                         {"run_off", s.dust->run_off_mm3}};
   }
   if (anatomy.structures) j["structures"] = structures_of(s.structures, *anatomy.structures, rate_hz);
+  for (const StructureCutEvent& e : s.structure_cuts) {
+    if (!anatomy.structures) break;
+    j["structures_cut"].push_back({{"name", anatomy.structures->name_of(e.cut.structure)},
+                                   {"value", e.cut.structure},
+                                   {"by", "saw"},
+                                   {"tick", e.tick},
+                                   {"t_s", static_cast<double>(e.tick) / rate_hz},
+                                   {"mm3", e.cut.mm3},
+                                   {"at_mm", {e.cut.at_mm.x, e.cut.at_mm.y, e.cut.at_mm.z}}});
+  }
   if (s.loop) {
     const LoopStats& l = *s.loop;
     j["loop"] = {{"work_us", quantiles(l.work)},

@@ -74,7 +74,9 @@ void SoundTracker::take(const TickRecord& record) noexcept {
   voice = {};
   const Burr* const edge = plate ? nullptr : instrument.cutter();
   if (edge != nullptr) {
-    voice.kind = edge->kind == BurrKind::cutting ? SoundKind::cutting : SoundKind::diamond;
+    voice.kind = SoundKind::burr;
+    voice.edge_db = row_of(edge->kind).sound_db;
+    voice.teeth_share = row_of(edge->kind).sound_teeth_share;
     voice.speed_rpm = record.speed_rpm * instrument.speed_share;  // a saw sounds at its strokes
     voice.diameter_mm = edge->diameter_mm;
     voice.press_n = record.normal_force_n;

@@ -23,7 +23,7 @@ float efficiency_at(double falloff_per_rad, double sine_of_latitude) {
 std::string Burr::name() const {
   if (length_mm > 0) return "saw " + format_number(length_mm) + " mm";
   const std::string form = shape == BurrShape::ball ? "" : std::string(EnumNames<BurrShape>::values[static_cast<std::size_t>(shape)]) + " ";
-  return std::string(EnumNames<BurrKind>::values[static_cast<std::size_t>(kind)]) + " " + form + format_number(diameter_mm) + " mm";
+  return std::string(row_of(kind).name) + " " + form + format_number(diameter_mm) + " mm";
 }
 
 RoundCone Burr::head() const {
@@ -43,9 +43,10 @@ const std::vector<Burr>& burr_library() {
   static const std::vector<Burr> library = [] {
     std::vector<Burr> all;
     for (const BurrShape shape : {BurrShape::ball, BurrShape::cylinder, BurrShape::taper}) {
-      for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
-        const double rate = kind == BurrKind::cutting ? 6 : 2, falloff = kind == BurrKind::cutting ? 3 : 0.3;
-        for (int d = 1; d <= 7; ++d) all.push_back({kind, static_cast<double>(d), rate * d / 4, falloff * d / 4, shape});
+      for (std::size_t n = 0; n < kBurrKinds.size(); ++n) {
+        const double rate = kBurrKinds[n].rate_mm3_per_s_per_n, falloff = kBurrKinds[n].falloff_mm3_per_s_per_n_per_rad;
+        for (int d = 1; d <= 7; ++d)
+          all.push_back({static_cast<BurrKind>(n), static_cast<double>(d), rate * d / 4, falloff * d / 4, shape});
       }
     }
     return all;
@@ -58,8 +59,11 @@ int burr_index(BurrKind kind, double diameter_mm, BurrShape shape) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].kind == kind && all[i].diameter_mm == diameter_mm && all[i].shape == shape) return static_cast<int>(i);
   }
+  std::string kinds;
+  for (std::size_t n = 0; n < kBurrKinds.size(); ++n)
+    kinds += (n == 0 ? "" : n + 1 == kBurrKinds.size() ? " or " : ", ") + std::string(kBurrKinds[n].name);
   throw Error(ExitCode::usage, "there is no burr of " + format_number(diameter_mm) + " mm",
-              "burrs are cutting or diamond, of 1, 2, 3, 4, 5, 6 or 7 mm");
+              "burrs are " + kinds + ", of 1, 2, 3, 4, 5, 6 or 7 mm");
 }
 
 BurrSamples sample_head(const RoundCone& head, double falloff_per_rad) {

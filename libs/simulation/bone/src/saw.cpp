@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace osteo::inline simulation {
@@ -29,9 +30,9 @@ double share_below(double depth, Vec3 n) {
   return std::clamp(sum / (6 * m[0] * m[1] * m[2]), 0.0, 1.0);
 }
 
-}  // namespace
-
-double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& changed) {
+// f(brick, voxel, its density, the share of it that the blade covers) for all with bone in them that it reaches.
+template <class F>
+void for_each_covered(const BrickGrid& bone, const SawCut& cut, F&& take) {
   const Frame& f = bone.frame();
   const double h = f.spacing_mm.x;
   const Vec3 normal = normalized(cut.normal);
@@ -49,12 +50,12 @@ double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& chan
   const std::array<Side, 3> sides{
       Side{to_index * normal, cut.kerf_mm / 2 / h}, {to_index * along, half_of(cut.length_mm)}, {to_index * across, half_of(cut.depth_mm)}};
   constexpr double kCorner = 6.1 + 0.9;  // from a brick's middle to a voxel's far corner
-  double removed = 0;
   for (std::uint32_t b = 0; b < bone.brick_count(); ++b) {
     const Ijk o = bone.brick_coordinate(b);
     const Vec3 middle = Vec3{o.i * 8 + 3.5, o.j * 8 + 3.5, o.k * 8 + 3.5} - centre;
-    if (std::any_of(sides.begin(), sides.end(), [&](const Side& s) { return std::abs(dot(middle, s.axis)) > s.half + kCorner; })) continue;
-    bool own = false;
+    if (std::any_of(sides.begin(), sides.end(),
+                    [&](const Side& s) { return std::abs(dot(middle, s.axis)) > s.half + kCorner; }))
+      continue;
     for (std::uint32_t v = 0; v < BrickGrid::kVoxels; ++v) {
       const VoxelKey key = b * BrickGrid::kVoxels + v;
       const float before = bone.value(key);
@@ -68,15 +69,38 @@ double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& chan
         covered *= std::abs(x) > s.half + 0.9 ? 0 : share_below(s.half - x, s.axis) - share_below(-s.half - x, s.axis);
         if (covered <= 0) break;
       }
-      const float after = std::max(0.0F, before * static_cast<float>(1 - covered));
-      if (covered <= 0 || after == before) continue;
-      if (!std::exchange(own, true)) bone.own_brick(b);
-      bone.set(key, after);
-      changed.push_back(key);
-      removed += static_cast<double>(before - after);
+      if (covered > 0) take(b, key, before, covered);
     }
   }
-  return removed * f.voxel_volume_mm3();
+}
+
+float left_of(float before, double covered) {
+  return std::max(0.0F, before * static_cast<float>(1 - covered));
+}
+
+}  // namespace
+
+double apply_saw(BrickGrid& bone, const SawCut& cut, std::vector<VoxelKey>& changed) {
+  double removed = 0;
+  std::optional<std::uint32_t> own;  // the last brick that was made the grid's own
+  for_each_covered(bone, cut, [&](std::uint32_t brick, VoxelKey key, float before, double covered) {
+    const float after = left_of(before, covered);
+    if (after == before) return;
+    if (own != brick) bone.own_brick(brick);
+    own = brick;
+    bone.set(key, after);
+    changed.push_back(key);
+    removed += static_cast<double>(before - after);
+  });
+  return removed * bone.frame().voxel_volume_mm3();
+}
+
+std::vector<VoxelKey> voxels_sawn(const BrickGrid& bone, const SawCut& cut) {
+  std::vector<VoxelKey> voxels;
+  for_each_covered(bone, cut, [&](std::uint32_t /*brick*/, VoxelKey key, float before, double covered) {
+    if (left_of(before, covered) != before) voxels.push_back(key);
+  });
+  return voxels;
 }
 
 }  // namespace osteo::simulation

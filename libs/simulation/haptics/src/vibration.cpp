@@ -1,5 +1,6 @@
 #include "osteo/simulation/haptics/vibration.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "osteo/core/base/error.h"
@@ -15,13 +16,22 @@ VibrationSpectrum parse_vibration(std::string_view text, const std::string& name
   const JsonFile file(text, name);
   const JsonValue& root = file.root();
   file.require_format("osteotome_vibration");
-  file.allow(root, "", std::vector<std::string>{"osteotome_vibration", "$schema", "about", "source", "band_hz", "cutting", "diamond"});
+  std::vector<std::string> keys{"osteotome_vibration", "$schema", "about", "source", "band_hz"};
+  for (const BurrKindRow& kind : kBurrKinds) keys.emplace_back(kind.name);
+  file.allow(root, "", keys);
   const auto& band = file.list(file.need(root, "", "band_hz"), "\"band_hz\"", 2);
   const double lo = file.number(band[0], "\"band_hz\"", 0, 1000), hi = file.number(band[1], "\"band_hz\"", 0, 1000);
   if (hi <= lo) throw file.wrong(band[1], "\"band_hz\" must be two rising frequencies up to 1000");
-  for (const BurrKind kind : {BurrKind::cutting, BurrKind::diamond}) {
-    const auto index = static_cast<std::size_t>(kind);
-    const std::string key(EnumNames<BurrKind>::values[index]);
+  for (std::size_t index = 0; index < kBurrKinds.size(); ++index) {
+    const BurrKindRow& kind = kBurrKinds[index];
+    const std::string key(kind.name);
+    if (kind.vibrates_as != kind.name && root.find(key) == nullptr) {
+      // A kind of before it in the table.
+      const auto like =
+          std::find(EnumNames<BurrKind>::values.begin(), EnumNames<BurrKind>::values.end(), kind.vibrates_as);
+      s.by_kind[index] = s.by_kind[static_cast<std::size_t>(like - EnumNames<BurrKind>::values.begin())];
+      continue;
+    }
     const JsonValue& peaks = file.need(root, "", key);
     int number = 0;
     for (const JsonValue& p : file.list(peaks, "\"" + key + "\"")) {

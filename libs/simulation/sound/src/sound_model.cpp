@@ -47,9 +47,9 @@ double envelope_db(double hz) noexcept {
 
 BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& m) noexcept {
   BurrSpectrum s;
-  const bool cutting = voice.kind == SoundKind::cutting;
   const double rpm = bounded(voice.speed_rpm, 0, 200000), press = bounded(voice.press_n, 0, 20);
-  if ((!cutting && voice.kind != SoundKind::diamond) || rpm < 1) return s;
+  if (voice.kind != SoundKind::burr || rpm < 1) return s;
+  const double edge_db = bounded(voice.edge_db, -60, 20), share = bounded(voice.teeth_share, 0, 1);
   s.softness = bounded(voice.softness, 0, 1);
   const double thickness = bounded(voice.thickness_mm, 0, 10);
   const double thin = press > 0 && thickness > 0 ? std::max(0.0, 1 - thickness / m.thin_mm) : 0;
@@ -57,10 +57,11 @@ BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& m) noexcep
 
   const double speed = speed_db(rpm, m), size = along(m.size_db, bounded(voice.diameter_mm, 0.5, 10));
   const double contact = press < 0.001 ? kSilent
-                                       : m.contact_db + size + (cutting ? 0 : m.diamond_db) + speed +
+                                       : m.contact_db + size + edge_db + speed +
                                              m.press_db_per_decade * log10_of(std::clamp(press, 0.01, 5.0));
   const double free = m.free_db + speed;
-  const double teeth = contact + 10 * log10_of(m.teeth_share), rest = contact + (cutting ? 10 * log10_of(1 - m.teeth_share) : 0);
+  const auto part = [](double of) { return of >= 1 ? 0 : of > 0 ? 10 * log10_of(of) : kSilent; };
+  const double teeth = contact + part(share), rest = contact + part(1 - share);
   const auto weight = [&](double hz) {
     return envelope_db(hz) + s.softness * m.soft_db * std::clamp(portable::log(std::max(hz, 1.0) / 2000) / portable::log(2), 0.0, 1.0);
   };
@@ -76,7 +77,7 @@ BurrSpectrum burr_spectrum(const SoundVoice& voice, const SoundModel& m) noexcep
   for (std::size_t k = 1; k <= BurrSpectrum::kToothLines; ++k) {
     const double n = static_cast<double>(k), multiple = n * m.teeth;
     add(BurrSpectrum::kRotationLines + k - 1, multiple,
-        cutting ? std::max(teeth, free - 12) - 6 * (n - 1) + weight(s.rotation_hz * multiple) : kSilent);
+        share > 0 ? std::max(teeth, free - 12) - 6 * (n - 1) + weight(s.rotation_hz * multiple) : kSilent);
   }
   s.noise_db = std::max({rest - 3 * s.softness, free - 10, kSilent});
   return s;

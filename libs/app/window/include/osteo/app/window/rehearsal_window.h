@@ -55,6 +55,8 @@ struct SessionFacts {
   struct Structure {
     std::string name;
     double least_clearance_mm = 0, touched_s = 0, injured_s = 0;
+    double cut_mm3 =
+        0;  ///< of it, in the path of saw cuts by a plane; where it is not 0 the clearance is of burrs alone
   };
   bool past = false;  ///< it was over before the window opened, and is only looked at
   std::filesystem::path folder;
@@ -63,6 +65,8 @@ struct SessionFacts {
   std::vector<std::string> plates;    ///< in words
   bool has_structures = false;        ///< the case knows structures at risk
   std::vector<Structure> structures;  ///< those that came near
+  /// A saw cut went through one.
+  void add_cut(const std::string& structure, double mm3);
   std::vector<std::string> warnings;
   std::optional<std::string> score;  ///< in words, where somebody gives one
 };

@@ -51,9 +51,9 @@ class Product {
     std::size_t evidence_count = 0;  ///< of all
     double evidence_each = 0;        ///< mm2 or mm3 that one place stands for
   };
-  /// `item`: of the procedure. From several threads at once if wanted. `approach`: unit, from the bone to who drills, in the first body's
-  /// frame: the middle of the cone of views of no_overhang; zero where it is not known. `injured`: names of structures that a turning burr
-  /// reached.
+  /// `item`: of the procedure. From several threads at once if wanted. `approach`: unit, from the bone to who drills,
+  /// in the first body's frame: the middle of the cone of views of no_overhang; zero where it is not known. `injured`:
+  /// names of structures that a running burr or a saw reached.
   [[nodiscard]] Result evaluate(const ScaleItem& item, Vec3 approach, const std::vector<std::string>& injured) const;
 
   /// Of an item that asks for no more than pieces and plates.

@@ -12,6 +12,7 @@
 #include "osteo/assessment/evidence/process.h"
 #include "osteo/assessment/evidence/product.h"
 #include "osteo/assessment/evidence/reference.h"
+#include "osteo/assessment/evidence/saw_cuts.h"
 #include "osteo/assessment/evidence/visibility.h"
 
 namespace osteo::inline assessment {
@@ -52,6 +53,7 @@ class ScoreKeeper {
   ProcessMetric process_;
   NearMetric near_;
   VisibilityMetric visibility_;
+  SawCutMetric saw_cuts_;
   std::map<VoxelKey, RemovedVoxel> removed_;
   Vec3 axes_;
   std::vector<Measured> values_;

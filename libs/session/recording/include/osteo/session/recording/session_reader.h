@@ -30,7 +30,11 @@ struct SessionOutline {
 
   std::vector<const RecordField*> tick_fields;        ///< those of ours that the file has
   std::map<std::uint32_t, std::string> action_names;  ///< as the file has them
-  std::vector<std::string> tools;                     ///< names of its instruments
+  /// Instruments and plates by the numbers that its records carry as they are read: those of this build's libraries,
+  /// whatever numbers the file has for the same names. What it lists and this build does not know has no number: a
+  /// record that tells of it is refused.
+  std::vector<std::string> tools, plates;
+  bool numbered_alike = true;  ///< the file has the same numbers for what both know
   /// Of its settings, under the numbers that its `setting` actions carry in the file; read, they carry the numbers of this build, kNobody
   /// where it has no such setting (then it is not replayable).
   std::vector<std::string> setting_names;
@@ -81,7 +85,8 @@ class SessionReader {
    public:
     ~Parts();
     Parts(Parts&&) noexcept;
-    /// The next; null behind the last. Holds until the next call. Error(corrupt) where a frame is not what its checksum promised.
+    /// The next; null behind the last. Holds until the next call. Error(corrupt) where a frame is not what its checksum
+    /// promised, or tells of an instrument or a plate that this build does not know (says which).
     const SessionPart* next();
 
    private:

@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 
+#include "osteo/simulation/bone/structure_cut.h"
 #include "osteo/core/rt/loop.h"
 #include "osteo/session/scene/operation.h"
 #include "osteo/session/scene/scene_readers.h"
@@ -42,6 +43,12 @@ struct ActionNote {
   std::uint64_t times = 1;  ///< in a row
 };
 
+/// A structure at risk that a cut by a plane went through.
+struct StructureCutEvent {
+  std::uint64_t tick = 0;
+  StructureCut cut;  ///< where, in the frame of the first body
+};
+
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;                 ///< by the burr
@@ -57,6 +64,7 @@ struct RehearsalSummary {
   bool interrupted = false;  ///< run_to_end() was asked to stop
   std::uint64_t session_bytes = 0;
   std::map<std::uint32_t, StructureEvents> structures;  ///< by their value; empty where the scene has none
+  std::vector<StructureCutEvent> structure_cuts;        ///< by planes, in their order; what was taken back too
   std::optional<Dust::Totals> dust;                     ///< where the scene has dust
   double voxel_mm3 = 0;                                 ///< turns the mass of a piece into a volume
   std::vector<LiveComponents::Component>
@@ -110,7 +118,7 @@ class Rehearsal {
   void act(const SceneAction& action);
   /// From any thread but the servo's: something that does not touch physics, at the tick that comes next. Counted where it is not kept.
   void note(const std::string& kind, const std::string& json);
-  /// Why the last action that could not be done was not; once.
+  /// Why the last action that could not be done was not, or which structures the last cut went through; once.
   std::string take_refusal();
 
   /// From any thread, while it runs: how the recording does (nothing lost, where none was asked for).
@@ -179,6 +187,7 @@ class Rehearsal {
   std::deque<SceneAction> timed_, queue_;
   std::string refused_;
   std::vector<ActionNote> notes_;
+  std::vector<StructureCutEvent> structure_cuts_;
   std::uint64_t soft_tick_ = 0;          // of the next update of soft tissue
   std::deque<SceneAction> soft_pushes_;  // of the last one, that the servo has not got yet: one a tick
   std::atomic<bool> stop_{false}, elsewhere_{false};
@@ -186,6 +195,7 @@ class Rehearsal {
   Device* seat_ = nullptr;
   const Seqlock<TickRecord>* seat_now_ = nullptr;
   std::size_t seat_hand_ = 0;
+  void look_at_cut(const SceneAction& action, const World::Effect& effect);
   std::exception_ptr failure_;  // of the follower's thread, or of what ran in this one
   std::optional<RehearsalSummary> summary_;
   std::thread thread_;

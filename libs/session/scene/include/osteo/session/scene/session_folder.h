@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "osteo/session/scene/case.h"
 #include "osteo/session/scene/rehearsal.h"
@@ -30,9 +31,20 @@ struct SessionFolder {
 /// Errors: no_input, corrupt. `case_folder` overrides what the session says when it is not empty.
 [[nodiscard]] SessionFolder open_session_folder(const std::filesystem::path& folder, const std::filesystem::path& case_folder = {});
 
+/// One of the sessions that another resumes from.
+struct SessionBefore {
+  SessionFolder session;
+  double until_s = 0;  ///< up to where the next goes on from it, in seconds from its beginning; 0: to its end
+};
+/// All that a session resumes from, the first of all first; empty where it began with the case. Opens their
+/// session.json only. Errors: those of open_session_folder; corrupt where they lead back to one of themselves (names
+/// the session.json that does).
+[[nodiscard]] std::vector<SessionBefore> sessions_before(const SessionFolder& session);
+
 /// The case's bone, with its finer region where it has one.
 [[nodiscard]] World world_of(const Case& the_case, const Anatomy& anatomy);
-/// The scene at the beginning of a session: the case's, as the sessions it goes on from have left it (their recorded changes and actions).
+/// The scene at the beginning of a session: the case's, as the sessions it goes on from have left it (their recorded
+/// changes and actions). Errors: those of sessions_before() too, as for the two below.
 [[nodiscard]] World world_at_begin(const SessionFolder& session, const Case& the_case, const Anatomy& anatomy, const Context& context);
 /// The scene at the end of a session; where bone was lost on the way, the scene before that. Warns of all that the session lacks.
 /// Error(corrupt) when it is damaged.

@@ -6,15 +6,11 @@
 #include <vector>
 
 #include "osteo/core/base/param.h"
+#include "osteo/simulation/bone/burr_kind.h"
 #include "osteo/simulation/bone/round_cone.h"
 #include "osteo/core/data/vec.h"
 
 namespace osteo::inline simulation {
-
-enum class BurrKind : int { cutting, diamond };
-[[nodiscard]] constexpr std::array<std::string_view, 2> enum_names(BurrKind) {
-  return {"cutting", "diamond"};
-}
 
 enum class BurrShape : int { ball, cylinder, taper };
 [[nodiscard]] constexpr std::array<std::string_view, 3> enum_names(BurrShape) {
@@ -43,11 +39,13 @@ struct Burr {
   [[nodiscard]] RoundCone shaft() const;
 };
 
-/// The library: cutting and diamond, balls, cylinders and tapers, 1 to 7 mm; the balls come first.
+/// The library: every kind (kBurrKinds) as balls, cylinders and tapers of 1 to 7 mm; the balls come first. Numbers in
+/// it are of this build: files go by names.
 [[nodiscard]] const std::vector<Burr>& burr_library();
 /// Error(usage) when there is none.
 [[nodiscard]] int burr_index(BurrKind kind, double diameter_mm, BurrShape shape = BurrShape::ball);
-/// Changes whenever the library does, or what its burrs remove: stored in session files, since the same poses would come out differently.
+/// Changes with what burrs of the library remove: stored in session files, since the same poses would come out
+/// differently. A burr beside the others changes nothing of theirs.
 inline constexpr int kBurrLibraryVersion = 3;
 
 /// About 3000 points of a cubic lattice inside a head, each standing for an equal share of its volume.

@@ -35,13 +35,14 @@ struct Instrument {
   [[nodiscard]] const Burr* as_burr() const { return kind == InstrumentKind::burr ? cutter() : nullptr; }
 };
 
-/// Burrs first, under their numbers in burr_library(); then suckers of 5, 7, 8, 10 and 12 French, an irrigator, a blunt probe, a hook.
-/// A tool is named by its index here, also in session files. Suckers: straight tubes as thick as the French scale says (a third of a
-/// millimetre each; sizes as the Frazier pattern is sold in), closed at the tip by a dome. What they suck is a guess: 60 mm3/s within 4 mm
-/// at 10 French, in proportion to the lumen's area and to its diameter. The irrigator's 24 ml a
-/// minute are a guess too. The hook's bent tip is felt as a ball around it. The saw, last: a
-/// reciprocating blade 1 mm thick with 25 mm of teeth, cut and felt as a rod of that thickness along the handle (its sides rub nowhere);
-/// 3 mm3/s/N is a guess, of the order in which a mandible's body is cut through in half a minute. Its motor turns as a drill's; each
+/// Burrs first, under their numbers in burr_library(); then suckers of 5, 7, 8, 10 and 12 French, an irrigator, a blunt
+/// probe, a hook. A tool is named by its index here; a session's file lists the names, and its reader gives the index
+/// that they have in this build. Suckers: straight tubes as thick as the French scale says (a third of a millimetre
+/// each; sizes as the Frazier pattern is sold in), closed at the tip by a dome. What they suck is a guess: 60 mm3/s
+/// within 4 mm at 10 French, in proportion to the lumen's area and to its diameter. The irrigator's 24 ml a minute are
+/// a guess too. The hook's bent tip is felt as a ball around it. The saw, last: a reciprocating blade 1 mm thick with
+/// 25 mm of teeth, cut and felt as a rod of that thickness along the handle (its sides rub nowhere); 3 mm3/s/N is a
+/// guess, of the order in which a mandible's body is cut through in half a minute. Its motor turns as a drill's; each
 /// fourth turn is a stroke.
 [[nodiscard]] const std::vector<Instrument>& instrument_library();
 /// Error(usage), with all names, when there is none.

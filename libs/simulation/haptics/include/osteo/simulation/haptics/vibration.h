@@ -16,10 +16,11 @@ struct VibrationSpectrum {
     double frequency_hz = 0, idle_n = 0, per_n = 0;
   };
   static constexpr std::size_t kMostPeaks = 16;
-  std::array<std::vector<Peak>, 2> by_kind;  ///< in the order of BurrKind
+  std::array<std::vector<Peak>, kBurrKinds.size()> by_kind;  ///< in the order of BurrKind
 };
 
-/// Reads { "osteotome_vibration": 1, "band_hz": [lo, hi], "cutting": [ {"frequency_hz", "idle_n", "per_n"} ], "diamond": [...] }.
+/// Reads { "osteotome_vibration": 1, "band_hz": [lo, hi], "cutting": [ {"frequency_hz", "idle_n", "per_n"} ],
+/// "diamond": [...] }, a list for each kind of burr but those that may have another's (BurrKindRow::vibrates_as).
 /// Error(usage) with the place in the text; `name` stands for the file in messages.
 [[nodiscard]] VibrationSpectrum parse_vibration(std::string_view json, const std::string& name);
 [[nodiscard]] VibrationSpectrum load_vibration(const std::filesystem::path& path);
@@ -37,7 +38,7 @@ class Vibration {
 
  private:
   VibrationSpectrum spectrum_;
-  std::array<std::array<double, VibrationSpectrum::kMostPeaks>, 2> phase_{};
+  std::array<std::array<double, VibrationSpectrum::kMostPeaks>, kBurrKinds.size()> phase_{};
 };
 
 }  // namespace osteo::simulation

@@ -6,7 +6,7 @@
 
 namespace osteo::inline simulation {
 
-enum class SoundKind : std::uint8_t { silent, cutting, diamond, sucker, irrigator };
+enum class SoundKind : std::uint8_t { silent, burr, sucker, irrigator };
 
 /// What one instrument does, as far as it is heard. Numbers outside their ranges are taken as the nearest inside; what is not finite as 0.
 struct SoundVoice {
@@ -17,6 +17,10 @@ struct SoundVoice {
   double thickness_mm = 0;  ///< of the bone under it, 0 to 10; 0: not known, taken as thick
   double softness = 0;      ///< 0 to 1: how near sinus, dura or a vessel is under the burr
   double draws = 0;         ///< sucker, irrigator: 0 off, 1 on
+  double edge_db = 0;       ///< burr: of its kind on bone, against a cutting burr, -60 to 20
+  /// Burr: of its sound power on bone what is in the lines of its teeth, 0 to 1; the rest is noise. 0: it has none, as
+  /// a diamond.
+  double teeth_share = 0.5;
 
   friend bool operator==(const SoundVoice&, const SoundVoice&) = default;
 };
@@ -45,11 +49,9 @@ struct SoundModel {
   double contact_db = 80;
   /// By diameter, in mm, against 6 mm; linear between: 4 mm -1 to -6, 2 mm -5 to -16 dB (Kylen 1977), their middles.
   std::array<std::array<double, 2>, 4> size_db{{{2, -10.5}, {4, -3.5}, {6, 0}, {7, 1.75}}};
-  double diamond_db = -8;           ///< against a cutting burr: -5 to -11 dB (Kylen 1977)
   double speed_db = 5;              ///< from 20,000 to 80,000 rpm, by the logarithm: 0 to 5 dB (Kylen 1977). Below: falls by 40 dB a decade
   double press_db_per_decade = 10;  ///< designed; from 0.01 N (-20 dB) to 5 N (+7 dB)
   double free_db = 58;              ///< running free: designed
-  double teeth_share = 0.5;         ///< of a cutting burr's sound power that is in its lines; the rest, and all of a diamond's, is noise
   int teeth = 8;                    ///< flutes of a cutting burr, which have 6 to 12
   /// The frequencies rise by this share where the bone is thin, from thin_mm to nothing (D. Morris 2006, section 3.2.9 lets the pitch rise;
   /// no measured value was found): designed.
