@@ -239,9 +239,11 @@ class Stepped {
     for (const ActionNote& a : s.notes)
       notes.append(py::dict(py::arg("tick") = a.tick, py::arg("action") = std::string(name_of(a.kind)), py::arg("done") = a.done,
                             py::arg("why") = a.why, py::arg("times") = a.times));
-    return py::dict(py::arg("ticks") = s.ticks, py::arg("removed_mm3") = s.removed_mm3, py::arg("sawn_mm3") = s.sawn_mm3,
-                    py::arg("bone_hash") = s.bone_hash, py::arg("surface_hash") = s.surface_hash, py::arg("actions") = notes,
-                    py::arg("ticks_not_recorded") = s.ticks_not_recorded, py::arg("unusable_poses") = s.unusable_poses);
+    return py::dict(py::arg("ticks") = s.ticks, py::arg("removed_mm3") = s.removed_mm3,
+                    py::arg("sawn_mm3") = s.sawn_mm3, py::arg("crumbs_mm3") = s.crumbs_mm3,
+                    py::arg("bone_hash") = s.bone_hash, py::arg("surface_hash") = s.surface_hash,
+                    py::arg("actions") = notes, py::arg("ticks_not_recorded") = s.ticks_not_recorded,
+                    py::arg("unusable_poses") = s.unusable_poses);
   }
 
   [[nodiscard]] std::vector<std::string> take_warnings() {

@@ -77,6 +77,14 @@ TEST(Findings, InjuriesComeFirstAndTouchesAreNoInjuries) {
   EXPECT_EQ(f.find("touch-dura")->text, "The burr touched the dura twice, for 0.1 s, without turning.");
   EXPECT_EQ(f.find("clearance-labyrinth")->text, "The burr came within 0.34 mm of the labyrinth.");
   EXPECT_EQ(f.find("untouched"), nullptr);
+  // A saw is called a saw.
+  s.moments.push_back({12, {}, "reached by the running saw", "sigmoid sinus", -0.1, 0});
+  const ScoreFinding both = findings_of(s, nullptr, nullptr).list.front();
+  EXPECT_EQ(both.text, "A turning burr reached the sigmoid sinus twice and the running saw once, for 0.41 s in all.");
+  EXPECT_EQ(both.times_s, (std::vector<double>{8, 12, 20}));
+  s.moments.erase(s.moments.begin(), s.moments.end() - 1);
+  EXPECT_EQ(findings_of(s, nullptr, nullptr).list.front().text,
+            "The running saw reached the sigmoid sinus once, for 0.41 s in all.");
   for (std::size_t n = 1; n < f.list.size(); ++n) EXPECT_GE(f.list[n - 1].severity, f.list[n].severity);
 }
 
@@ -185,6 +193,14 @@ TEST(Findings, NumbersAsPeopleSayThem) {
   EXPECT_EQ(told_seconds(60), "1 min");
   EXPECT_EQ(told_seconds(59.6), "1 min");
   EXPECT_EQ(told_seconds(0.41), "0.41 s");
+}
+
+TEST(Findings, AUnitIsWrittenOneWayForPeople) {
+  EXPECT_EQ(unit_text("mm3"), "mm³");
+  EXPECT_EQ(unit_text("mm2"), "mm²");
+  EXPECT_EQ(unit_text("mm3/s"), "mm³/s");
+  EXPECT_EQ(unit_text("N s"), "N s");
+  EXPECT_EQ(unit_text("1"), "");
 }
 
 }  // namespace

@@ -155,6 +155,18 @@ TEST(Sessions, ASawThroughAStructureIsTold) {
       << good.find("untouched")->text;
 }
 
+// The saw takes 220 mm3 and leaves a slice of 110 mm3 at the edge, which goes as a crumb: no saw took that.
+TEST(Sessions, CrumbsAreNotSawnInTheSummaryNorInTheScore) {
+  const test::ScratchFolder scratch;
+  const RehearsalSummary s =
+      record(scratch / "s.oss", 1,
+             {at(200, SceneAction::saw({{10, 0, 0}, {1, 0, 0}, {0, 0, 1}, 1})), at(400, SceneAction::split(150)),
+              at(500, SceneAction::saw({{-9, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.5}))});
+  EXPECT_NEAR(s.sawn_mm3, 220 + 110, 3);
+  EXPECT_NEAR(s.crumbs_mm3, 110, 3);
+  EXPECT_NEAR(value(score(scratch / "s.oss").values, "sawn_mm3"), s.sawn_mm3, 1e-3);
+}
+
 TEST(Sessions, UndoTakesBackWhatWasRemoved) {
   const test::ScratchFolder scratch;
   record(scratch / "all.oss", 1);

@@ -57,8 +57,10 @@ TEST(TimelineKeeper, SamplesAreWhatTheirTicksSay) {
   const Timeline line = keeper.timeline(voxels);
   ASSERT_EQ(line.size(), 2U);
   EXPECT_EQ(line.force_n, (std::vector<float>{3, 0}));
-  EXPECT_NEAR(static_cast<double>(line.speed_mm_s[0]), 9.9, 1e-3);  // 99 steps of 0.01 mm in a tenth of a second
-  EXPECT_NEAR(static_cast<double>(line.speed_mm_s[1]), 0, 1e-3);
+  // A stop from one tick to the next is one over two windows of 25 ms, half of which lie before it: a sixth of the
+  // speed goes over.
+  EXPECT_NEAR(static_cast<double>(line.speed_mm_s[0]), (50 + 25 * 5.0 / 6) * 10 / 75, 0.1);
+  EXPECT_NEAR(static_cast<double>(line.speed_mm_s[1]), 25 * 1.0 / 6 * 10 / 75, 0.1);
   EXPECT_NEAR(static_cast<double>(line.distance_mm[0]), 6 - 2 - 1, 0.08);  // burr of 1 mm radius, ball of 2
   EXPECT_EQ(line.structure[0], 1);
   EXPECT_EQ(line.drilling, (std::vector<std::uint8_t>{1, 0}));

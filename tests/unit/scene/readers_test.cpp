@@ -277,7 +277,7 @@ TEST(Strokes, AreTakenBackLiveAndInAReplay) {
     EXPECT_EQ(s.surface_hash, SurfaceReader(world, {}).hash());
     EXPECT_EQ(s.bodies, 1u);
     ASSERT_TRUE(s.dust);
-    EXPECT_NEAR(s.dust->added_mm3, s.removed_mm3 + s.sawn_mm3, 1e-3) << "what was drilled stays dust";
+    EXPECT_NEAR(s.dust->added_mm3, s.removed_mm3 + s.sawn_mm3 + s.crumbs_mm3, 1e-3) << "what was drilled stays dust";
     const Session session = read_session(o.session_file);
     std::size_t strokes = 0;
     for (const RecordedAction& a : session.actions) strokes += a.action.is(ActionKind::stroke) ? 1 : 0;

@@ -103,7 +103,8 @@ TEST(Recording, NoActionIsLostByTheClock) {
     while (r.running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const RehearsalSummary summary = r.stop();
     EXPECT_EQ(r.take_refusal(), "");
-    EXPECT_NEAR(summary.dust->added_mm3, summary.removed_mm3 + summary.sawn_mm3, 1e-3) << "what is sawn last becomes dust too";
+    EXPECT_NEAR(summary.dust->added_mm3, summary.removed_mm3 + summary.sawn_mm3 + summary.crumbs_mm3, 1e-3)
+        << "what is sawn last becomes dust too";
     const Session s = read_session(file);
     std::size_t done = 0;
     for (const RecordedAction& a : s.actions)
@@ -265,7 +266,7 @@ TEST(Recording, AFollowerThatLostTicksCatchesUpWithTheBone) {
     EXPECT_GT(operation.removed_mm3(), 2);
     const Dust::Totals d = readers.dust->dust().totals();
     EXPECT_NEAR(d.added_mm3, before - operation.world().volume_mm3(), 1e-2);
-    EXPECT_NEAR(d.added_mm3, operation.removed_mm3() + readers.tools.sawn_mm3(), 1e-2);
+    EXPECT_NEAR(d.added_mm3, operation.removed_mm3() + readers.tools.sawn_mm3() + readers.tools.crumbs_mm3(), 1e-2);
     EXPECT_NEAR(d.added_mm3, d.present_mm3 + d.slurry_mm3 + d.sucked_mm3 + d.fallen_mm3, 1e-9);
   }
 }

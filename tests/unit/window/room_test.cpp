@@ -424,8 +424,8 @@ TEST(EndFacts, TellWhatWasDone) {
     return EndLine{what, "not there", Nearness::unknown};
   };
   EXPECT_EQ(value("time").value, "1:02:05");
-  EXPECT_EQ(value("bone drilled away").value, "30.0 mm3");
-  EXPECT_EQ(value("    cutting 4 mm").value, "30.0 mm3 in 0:03");
+  EXPECT_EQ(value("bone drilled away").value, "30.0 mm³");
+  EXPECT_EQ(value("    cutting 4 mm").value, "30.0 mm³ in 0:03");
   EXPECT_EQ(value("taken back").value, "1");
   EXPECT_EQ(value("score").value, "not there");
   EXPECT_EQ(value("facial nerve").nearness, Nearness::near);

@@ -43,14 +43,14 @@ EndFacts end_facts(const SessionFacts& session, const WorkDone& work) {
   };
   add("time", clock_text(session.seconds));
   if (session.score) add("score", *session.score);
-  add("bone drilled away", text_of("%.1f mm3", session.removed_mm3));
+  add("bone drilled away", text_of("%.1f mm³", session.removed_mm3));
   for (const auto& [tool, done] : work.by_tool()) {
-    add("    " + instrument_of(tool).name,
-        text_of("%.1f mm3 in ", done.removed_mm3) + clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz));
+    add("    " + instrument_of(tool).name, text_of("%.1f mm³ in ", done.removed_mm3) +
+                                               clock_text(static_cast<double>(done.ticks_turning) / session.rate_hz));
   }
   if (work.undone() > 0) add("taken back", text_of("%zu", work.undone()));
-  if (work.cuts() > 0 || session.sawn_mm3 > 0) add("saw cuts", text_of("%zu, %.1f mm3", work.cuts(), session.sawn_mm3));
-  if (session.tissue_mm3 > 0) add("soft tissue cut off", text_of("%.1f mm3", session.tissue_mm3));
+  if (work.cuts() > 0 || session.sawn_mm3 > 0) add("saw cuts", text_of("%zu, %.1f mm³", work.cuts(), session.sawn_mm3));
+  if (session.tissue_mm3 > 0) add("soft tissue cut off", text_of("%.1f mm³", session.tissue_mm3));
   if (session.bodies > 1) add("pieces of bone", text_of("%zu", session.bodies));
   for (const std::string& p : session.plates) add("plate", p);
   if (session.has_structures && session.structures.empty()) add("structures at risk", "none came near", Nearness::far);

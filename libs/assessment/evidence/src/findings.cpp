@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace osteo::inline assessment {
 namespace {
 
 std::string in(double v, const std::string& unit) {
-  static const std::map<std::string, std::string> kUnits{{"mm3", "mm³"}, {"mm2", "mm²"}, {"1", ""}};
-  const auto at = kUnits.find(unit);
-  const std::string u = at == kUnits.end() ? unit : at->second;
+  const std::string u = unit_text(unit);
   return told_number(v) + (u.empty() ? "" : " " + u);
 }
 std::string percent(double share) {
@@ -64,16 +61,16 @@ class Finder {
   }
 
  private:
-  [[nodiscard]] std::optional<double> value(std::string_view name, const std::string& of = {}) const {
+  [[nodiscard]] std::optional<double> value(MetricName name, const std::string& of = {}) const {
     for (const Measured& m : score_.values) {
-      if (m.row->name == name && m.of == of) return m.value;
+      if (m.is(name) && m.of == of) return m.value;
     }
     return std::nullopt;
   }
-  [[nodiscard]] std::vector<std::pair<std::string, double>> values(std::string_view name) const {
+  [[nodiscard]] std::vector<std::pair<std::string, double>> values(MetricName name) const {
     std::vector<std::pair<std::string, double>> all;
     for (const Measured& m : score_.values) {
-      if (m.row->name == name && m.value) all.emplace_back(m.of, *m.value);
+      if (m.is(name) && m.value) all.emplace_back(m.of, *m.value);
     }
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
     return all;
@@ -92,13 +89,13 @@ class Finder {
     out_.list.push_back(std::move(f));
     return out_.list.back();
   }
-  static void from(ScoreFinding& f, std::string metric, const std::string& structure, std::optional<double> v,
+  static void from(ScoreFinding& f, MetricName name, const std::string& structure, std::optional<double> v,
                    std::optional<double> limit) {
-    f.metric = structure.empty() ? metric : metric + "[" + structure + "]";
+    f.metric = structure.empty() ? std::string(name.row().name) : std::string(name.row().name) + "[" + structure + "]";
     f.structure = structure;
     f.value = v;
     f.limit = limit;
-    f.unit = metric_row(metric).unit;
+    f.unit = name.row().unit;
   }
   void moments(ScoreFinding& f, std::string_view what, const std::string& structure) const {
     for (const Moment& m : score_.moments) {
@@ -159,25 +156,23 @@ class Finder {
       const double injured = value("injured_s", name).value_or(0), touched = value("touched_s", name).value_or(0);
       if (const auto c = value("clearance_mm", name); c && *c < nearest.second) nearest = {name, *c};
       if (injured > 0) {
-        const auto count = static_cast<double>(std::count_if(
-            score_.moments.begin(), score_.moments.end(),
-            [&, &of = name](const Moment& m) { return m.what.starts_with("reached by") && m.structure == of; }));
-        const bool sawn = std::any_of(score_.moments.begin(), score_.moments.end(), [&, &of = name](const Moment& m) {
-          return m.what == "reached by the running saw" && m.structure == of;
-        });
-        const bool burred = std::any_of(score_.moments.begin(), score_.moments.end(), [&, &of = name](const Moment& m) {
-          return m.what == "reached by a turning burr" && m.structure == of;
-        });
-        ScoreFinding& f = add("injury", name, FindingSeverity::serious,
-                              std::string(!sawn    ? "A turning burr"
-                                          : burred ? "A turning burr and the running saw"
-                                                   : "The running saw") +
-                                  " reached the " + name + (count > 0 ? " " + times(count) : "") + ", for " +
-                                  told_seconds(injured) + " in all.",
-                              "Reached: its surface lay inside the structure's face.");
+        const auto count = [&, &of = name](std::string_view what) {
+          return static_cast<double>(std::count_if(score_.moments.begin(), score_.moments.end(), [&](const Moment& m) {
+            return m.what == what && m.structure == of;
+          }));
+        };
+        const double burr = count("reached by a turning burr"), saw = count("reached by the running saw");
+        std::string text = burr == 0 && saw > 0 ? "The running saw reached the " : "A turning burr reached the ";
+        text += name;
+        if (burr > 0 || saw > 0) text += " " + times(burr > 0 ? burr : saw);
+        if (burr > 0 && saw > 0) text += " and the running saw " + times(saw);
+        ScoreFinding& f =
+            add("injury", name, FindingSeverity::serious, text + ", for " + told_seconds(injured) + " in all.",
+                "Reached: the tool's surface lay inside the structure's face.");
         from(f, "injured_s", name, injured, 0);
         moments(f, "reached by a turning burr", name);
         moments(f, "reached by the running saw", name);
+        std::sort(f.times_s.begin(), f.times_s.end());
       } else if (n > 0) {
         ScoreFinding& f = add("touch", name, FindingSeverity::caution,
                               "The burr touched the " + name + " " + times(n) + ", for " + told_seconds(touched) + ", without turning.");
@@ -286,7 +281,7 @@ class Finder {
       from(f, "excess_force_ns", name, ns, 0);
       moments(f, "pressed too hard near it", name);
     }
-    const auto band = [&](const char* metric, const char* kind, const char* how, const char* what) {
+    const auto band = [&](MetricName metric, const char* kind, const char* how, const char* what) {
       for (const auto& [name, share] : values(metric)) {
         if (share <= limits_.above_band_share || to_be_opened(name)) continue;
         ScoreFinding& f = add(
@@ -432,7 +427,7 @@ class Finder {
     };
     for (const Measured& m : score_.values) {
       // A structure that no burr came near has no clearance to tell: that is as it should be.
-      if (m.value || (m.row->name == "clearance_mm" && !m.of.empty())) continue;
+      if (m.value || (m.is("clearance_mm") && !m.of.empty())) continue;
       put(m.word, std::string(m.row->name) + (m.of.empty() ? "" : " of " + m.of));
     }
     for (const Product::Result& r : score_.items) {
@@ -452,6 +447,15 @@ class Finder {
 std::string_view name_of(FindingSeverity severity) {
   static constexpr std::array<std::string_view, 4> kNames{"good", "note", "caution", "serious"};
   return kNames[static_cast<std::size_t>(severity)];
+}
+
+std::string unit_text(std::string_view unit) {
+  if (unit == "1") return {};
+  std::string text(unit);
+  for (const auto& [code, shown] : {std::pair{"mm2", "mm²"}, std::pair{"mm3", "mm³"}}) {
+    if (unit.starts_with(code)) text.replace(0, 3, shown);
+  }
+  return text;
 }
 
 std::string told_number(double v) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "osteo/simulation/bone/instrument.h"
 #include "osteo/assessment/evidence/visibility.h"
@@ -12,10 +14,12 @@
 namespace osteo::inline assessment {
 namespace {
 
-constexpr double kStillMmPerS = 2, kIdleAfterS = 1;
+constexpr double kPathStepMm = 0.05;  // less is no way: as strokes go by
+// A force above a limit that comes again within a second is told once.
+constexpr double kSameExcessS = 1;
 // Of NearMetric::kBandsMm.
-constexpr const char* kNearS[] = {"near_05_s", "near_1_s", "near_s", "near_4_s"};
-constexpr const char* kNearMm3[] = {"near_05_mm3", "near_1_mm3", "near_mm3", "near_4_mm3"};
+constexpr MetricName kNearS[] = {"near_05_s", "near_1_s", "near_s", "near_4_s"};
+constexpr MetricName kNearMm3[] = {"near_05_mm3", "near_1_mm3", "near_mm3", "near_4_mm3"};
 static_assert(std::size(kNearS) == NearMetric::kBandsMm.size() && NearMetric::kBandsMm[2] == kNearMm);
 
 bool drills(const TickRecord& t, const Instrument& tool) {
@@ -37,6 +41,7 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
   lost_ += f.lost_before;
   if (f.lost_before > 0) {
     last_ = {};
+    path_.forget();
     path_at_.reset();
   }
   for (const SceneAction& a : f.actions) {
@@ -48,15 +53,14 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
     if (const PlacedBody* const b = f.world.owner(c.voxel))
       sawn_mm3_ += static_cast<double>(c.before - c.density) * b->body->bone.frame().voxel_volume_mm3();
   }
-  bool sucker_in_hand = false, water_in_hand = false, pedal = false;
+  bool sucker_in_hand = false, water_in_hand = false;
   for (const TickRecord& t : f.ticks) {
     const Instrument& tool = instrument_of(t.device.tool);
-    pedal |= t.device.pedal > 0;
     sucker_in_hand |= tool.kind == InstrumentKind::sucker && t.device.pedal > 0;
     water_in_hand |= tool.kind == InstrumentKind::irrigator && t.device.pedal > 0;
   }
-  double moved_mm = 0;
   std::uint64_t ticks = 0;
+  const auto every = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(f.rate_hz / 100)));
   for (const TickRecord& t : f.ticks) {
     const Instrument& tool = instrument_of(t.device.tool);
     if (t.hand == 0) {
@@ -65,18 +69,24 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
       ++by_tool_[t.device.tool];
     }
     const Vec3 at = from_floats(t.device.position_mm), force = from_floats(t.force_n);
-    Last& last = last_[std::min<std::size_t>(t.hand, kMostHands - 1)];
+    Last& last = last_[t.hand];
     const bool good = (t.flags & (kPoseInvalid | kPoseJumped)) == 0;
-    if (last.known && good) {
-      const Vec3 by = at - last.at_mm;
-      moved_mm = std::max(moved_mm, length(by));
-      // Against the force on the hand, trapezoidal: what the hand puts in.
-      work_mj_ -= dot((force + last.force_n) * 0.5, by);
-    }
+    // Against the force on the hand, trapezoidal: what the hand puts in.
+    if (last.known && good) work_mj_ -= dot((force + last.force_n) * 0.5, at - last.at_mm);
     last = {good, at, force};
-    if (t.hand == 0 && t.tick % std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(f.rate_hz / 100))) == 0 && good) {
-      if (path_at_) path_mm_ += length(at - *path_at_);
-      path_at_ = at;
+    idle_.add(t);
+    if (t.hand == 0) {
+      if (good) {
+        path_.add(t.tick, at);
+      } else {
+        path_.forget();
+        path_at_.reset();
+      }
+      if (const auto place = path_.place_mm(); place && t.tick % every == 0) {
+        const double step = path_at_ ? length(*place - *path_at_) : 0;
+        if (step >= kPathStepMm) path_mm_ += step;
+        if (!path_at_ || step >= kPathStepMm) path_at_ = place;
+      }
     }
     removed_mm3_ += static_cast<double>(t.removed_mm3);
     if (t.removed_mm3 > 0) removed_by_tool_[t.device.tool] += static_cast<double>(t.removed_mm3);
@@ -96,15 +106,9 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
     }
     if (t.hand == 0) strokes_.add(t_s, at);
   }
-  volume_at_.emplace_back(
-      f.ticks.empty() ? (volume_at_.empty() ? 0 : volume_at_.back().first) : seconds(f.ticks.back().tick + 1, f.rate_hz), removed_mm3_);
-  // A frame is still when in no tick of it a hand moves faster than 2 mm/s, and no pedal is down.
-  if (!pedal && moved_mm * f.rate_hz < kStillMmPerS) {
-    still_ += ticks;
-  } else {
-    if (seconds(still_, f.rate_hz) >= kIdleAfterS) idle_ += still_;
-    still_ = 0;
-  }
+  volume_at_.emplace_back(f.ticks.empty() ? (volume_at_.empty() ? 0 : volume_at_.back().first)
+                                          : seconds(f.ticks.back().tick + 1, f.rate_hz),
+                          removed_mm3_);
   if (f.camera != nullptr) {
     const bool moved = camera_ && (!(camera_->eye_mm == f.camera->eye_mm) || !(camera_->target_mm == f.camera->target_mm));
     if (moved) camera_ticks_ += ticks;
@@ -117,11 +121,10 @@ void ProcessMetric::frame(const EvidenceFrame& f) {
 
 void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values, std::vector<Moment>& moments) {
   const double hz = scene_.rate_hz, drilling_s = seconds(drilling_, hz);
-  if (seconds(still_, hz) >= kIdleAfterS) idle_ += still_;
   values.push_back(measured("duration_s", seconds(ticks_, hz)));
   if (lost_ > 0) values.push_back(measured("lost_s", seconds(lost_, hz)));
   values.push_back(measured("drilling_s", drilling_s));
-  values.push_back(measured("idle_s", seconds(idle_, hz)));
+  values.push_back(measured("idle_s", seconds(idle_.idle_ticks(), hz)));
   values.push_back(measured("removed_mm3", removed_mm3_));
   if (sawn_mm3_ > 0) values.push_back(measured("sawn_mm3", sawn_mm3_));
   values.push_back(measured("path_mm", path_mm_));
@@ -132,13 +135,12 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
     values.push_back(measured("camera_moves", static_cast<double>(camera_moves_)));
     values.push_back(measured("camera_s", seconds(camera_ticks_, hz)));
   } else {
-    for (const char* const name : {"camera_moves", "camera_s"}) values.push_back(not_measured(name, "the session has no camera notes"));
+    not_measured_all(values, MetricPlace::process, {MetricWhen::camera}, "the session has no camera notes");
   }
   if (drilling_ == 0) {
-    for (const char* const name :
-         {"rate_mm3_per_s", "force_median_n", "force_p95_n", "force_peak_n", "suction_share", "irrigation_share", "burr_side_share",
-          "strokes", "strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance", "stroke_sparc", "stroke_ldlj", "phase_s"})
-      values.push_back(not_measured(name, "no burr drilled"));
+    not_measured_all(values, MetricPlace::process,
+                     {MetricWhen::drilling, MetricWhen::stroke, MetricWhen::smooth_stroke, MetricWhen::removal},
+                     "no burr drilled");
     return;
   }
   const auto share = [&](std::uint64_t n) { return static_cast<double>(n) / static_cast<double>(drilling_); };
@@ -154,8 +156,8 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
   const std::vector<Stroke>& strokes = strokes_.finish();
   values.push_back(measured("strokes", static_cast<double>(strokes.size())));
   if (strokes.empty()) {
-    for (const char* const name : {"strokes_per_s", "stroke_mm", "stroke_s", "stroke_variance", "stroke_sparc", "stroke_ldlj"})
-      values.push_back(not_measured(name, "no stroke of 1 mm and 80 ms"));
+    not_measured_all(values, MetricPlace::process, {MetricWhen::stroke, MetricWhen::smooth_stroke},
+                     "no stroke of 1 mm and 80 ms");
   } else {
     std::vector<double> mm, s, sparc, jerk;
     for (const Stroke& k : strokes) {
@@ -169,14 +171,14 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
     values.push_back(measured("stroke_mm", median(mm)));
     values.push_back(measured("stroke_s", median(s)));
     values.push_back(measured("stroke_variance", stroke_variance(strokes)));
-    const auto smooth = [&](const char* name, const std::vector<double>& v) {
+    const auto smooth = [&](MetricName name, const std::vector<double>& v) {
       values.push_back(v.empty() ? not_measured(name, "no stroke of 100 ms") : measured(name, median(v)));
     };
     smooth("stroke_sparc", sparc);
     smooth("stroke_ldlj", jerk);
   }
   if (removed_mm3_ <= 0) {
-    values.push_back(not_measured("phase_s", "nothing was removed"));
+    not_measured_all(values, MetricPlace::process, {MetricWhen::removal}, "nothing was removed");
     return;
   }
   // When each fifth of the volume was gone.
@@ -189,27 +191,55 @@ void ProcessMetric::finish(const World& /*world*/, std::vector<Measured>& values
   }
 }
 
-NearMetric::NearMetric(const EvidenceScene& scene) : scene_(scene) {
+NearMetric::NearMetric(const EvidenceScene& scene) : scene_(scene), hands_(Hand(scene.rate_hz)) {
   if (scene_.structures == nullptr) return;
   of_.resize(scene_.structures->values().size());
   each_.resize(of_.size());
+  for (Hand& hand : hands_) hand.at.resize(of_.size());
   if (scene_.procedure == nullptr) return;
-  last_excess_.assign(scene_.procedure->force_limits.size(), 0);
+  for (Hand& hand : hands_) hand.excess.resize(scene_.procedure->force_limits.size());
   steps_.emplace(*scene_.structures, *scene_.procedure, scene_.rate_hz);
+}
+
+void NearMetric::forget() {
+  for (Hand& hand : hands_) {
+    hand.motion.forget();
+    hand.waiting.clear();
+    for (Contact& c : hand.at) {
+      c.touch.forget();
+      c.injury.forget();
+    }
+  }
+}
+
+// Gives samples of a window ago their speeds.
+void NearMetric::move(Hand& hand, const TickRecord& t) {
+  if ((t.flags & (kPoseInvalid | kPoseJumped)) != 0) {
+    hand.motion.forget();
+    hand.waiting.clear();
+    return;
+  }
+  hand.motion.add(t.tick, from_floats(t.device.position_mm));
+  const auto speed = hand.motion.speed_mm_s();
+  if (!speed) return;
+  std::erase_if(hand.waiting, [&](const Waiting& w) {
+    if (w.tick == hand.motion.speed_tick()) samples_[w.structure][w.number].speed_mm_s = static_cast<float>(*speed);
+    return w.tick <= hand.motion.speed_tick();
+  });
 }
 
 void NearMetric::frame(const EvidenceFrame& f) {
   if (scene_.structures == nullptr) return;
-  if (f.lost_before > 0) last_at_ = {};
+  if (f.lost_before > 0) forget();
   const auto every = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(f.rate_hz / 100)));
   const RigidTransform own = f.world.bodies().front().world_from_body.inverse();
   const std::vector<std::uint8_t>& names = scene_.structures->values();
   for (const TickRecord& t : f.ticks) {
-    const std::uint64_t n = ticks_++;
     if (t.hand == 0) ++known_;
-    const std::size_t hand = std::min<std::size_t>(t.hand, kMostHands - 1);
+    Hand& hand = hands_[t.hand];
+    const bool first = !std::exchange(hand.begun, true);
+    move(hand, t);
     const Vec3 device_at = from_floats(t.device.position_mm);
-    const std::optional<Vec3> last_at = std::exchange(last_at_[hand], device_at);
     const Instrument& tool = instrument_of(t.device.tool);
     if ((t.flags & kPlateInHand) != 0) continue;
     const bool turns = tool.cutter() != nullptr && static_cast<double>(t.speed_rpm) > kTurnsRpm;
@@ -224,29 +254,31 @@ void NearMetric::frame(const EvidenceFrame& f) {
       const double d = each_[s];
       o.least_mm = std::min(o.least_mm, d);
       const bool touches = d <= 0, injures = touches && turns;
+      // Time is counted once, whichever and however many hands are there.
+      const auto count = [&](std::uint64_t& ticks, std::uint64_t& until) {
+        if (until <= t.tick) ++ticks;
+        until = t.tick + 1;
+      };
       if (touches) {
-        ++o.touched;
-        if (n == 0) o.touched_first = true;
-        // A touch that comes again within a tenth of a second is the same.
-        if (!o.touched_before || seconds(t.tick - o.last_touch, f.rate_hz) > 0.1) ++o.touches;
-        o.touched_before = true;
-        o.last_touch = t.tick;
+        count(o.touched, o.touched_until);
+        o.touched_first = o.touched_first || first;
+        if (hand.at[s].touch.begins(t.tick, f.rate_hz, kSameContactS)) ++o.touches;
       }
       if (injures) {
-        ++o.injured;
-        if (!o.injured_before)
+        count(o.injured, o.injured_until);
+        if (hand.at[s].injury.begins(t.tick, f.rate_hz, kSameContactS))
           moments_.push_back({t_s, at, tool.kind == InstrumentKind::saw ? "reached by the running saw" : "reached by a turning burr",
                               scene_.structures->name_of(names[s]), d, 0});
       }
-      o.injured_before = injures;
       for (std::size_t b = 0; b < kBandsMm.size(); ++b) {
         if (d >= kBandsMm[b]) continue;
         if (works) ++o.near[b];
         if (removes) o.near_mm3[b] += static_cast<double>(t.removed_mm3);
       }
       if (works && d < scene_.structures->reach_mm() && t.tick % every == 0) {
-        const double speed = last_at ? length(device_at - *last_at) * f.rate_hz : 0;
-        samples_[names[s]].push_back({t_s, at, static_cast<float>(d), t.normal_force_n, static_cast<float>(speed)});
+        std::vector<Sample>& samples = samples_[names[s]];
+        hand.waiting.push_back({t.tick, names[s], samples.size()});
+        samples.push_back({t_s, at, static_cast<float>(d), t.normal_force_n, std::numeric_limits<float>::quiet_NaN()});
       }
     }
     if (!works || scene_.procedure == nullptr) continue;
@@ -269,9 +301,8 @@ void NearMetric::frame(const EvidenceFrame& f) {
       for (std::size_t s = 0; s < of_.size(); ++s) {
         if (each_[s] >= limit.within_mm || force <= limit.most_n || scene_.structures->name_of(names[s]) != limit.structure) continue;
         of_[s].excess_ns += (force - limit.most_n) / f.rate_hz;
-        if (last_excess_[l] == 0 || seconds(t.tick + 1 - last_excess_[l], f.rate_hz) > 1)
+        if (hand.excess[l].begins(t.tick, f.rate_hz, kSameExcessS))
           moments_.push_back({t_s, at, "pressed too hard near it", limit.structure, force, limit.most_n});
-        last_excess_[l] = t.tick + 1;
       }
     }
   }
@@ -279,9 +310,7 @@ void NearMetric::frame(const EvidenceFrame& f) {
 
 void NearMetric::finish(const World& /*world*/, std::vector<Measured>& values, std::vector<Moment>& moments) {
   if (scene_.structures == nullptr) {
-    for (const char* const name : {"clearance_mm", "touches", "touched_s", "injured_s", "near_s", "near_mm3", "near_05_s", "near_05_mm3",
-                                   "near_1_s", "near_1_mm3", "near_4_s", "near_4_mm3"})
-      values.push_back(not_measured(name, "the case has no structures"));
+    not_measured_all(values, MetricPlace::near, {MetricWhen::structures}, "the case has no structures");
     return;
   }
   for (std::size_t s = 0; s < of_.size(); ++s) {

@@ -32,8 +32,7 @@ void SawCutMetric::frame(const EvidenceFrame& f) {
 void SawCutMetric::finish(const World& /*world*/, std::vector<Measured>& values, std::vector<Moment>& moments) {
   if (!any_) return;
   if (scene_.structures == nullptr) {
-    for (const char* const name : {"cut_mm3", "saw_clearance_mm"})
-      values.push_back(not_measured(name, "the case has no structures"));
+    not_measured_all(values, MetricPlace::saw, {MetricWhen::some}, "the case has no structures");
     return;
   }
   for (const std::uint8_t s : scene_.structures->values()) {

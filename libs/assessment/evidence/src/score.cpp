@@ -107,10 +107,8 @@ void check_procedure(const Procedure& p, const StructureMap* structures, std::ve
   if (!missing.empty()) words.push_back("the case lacks " + missing + ": what the procedure asks of them is not judged");
 }
 
-void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, const Reference* reference, const std::string& subject,
-                  Score& score) {
-  static constexpr const char* kRegion[] = {"region_log_ratio", "region_per_voxel", "region_voxels", "region_thesis"};
-  static constexpr const char* kBand[] = {"force_above_band_share", "speed_above_band_share"};
+void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, const Reference* reference,
+                  const std::string& subject, Score& score) {
   if (reference == nullptr) return;
   const RemovedSet mine = keeper.removed_set();
   std::vector<RemovedSet> experts, novices;
@@ -123,12 +121,12 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
   const std::size_t left_out = reference->sessions.size() - experts.size() - novices.size();
   if (left_out > 0)
     score.words.push_back(std::to_string(left_out) + " sessions of the reference are left out: of the same person, or the same session");
-  const auto no = [&](const auto& names, const std::string& why) {
-    for (const char* const n : names) score.values.push_back(not_measured(n, why));
+  const auto no = [&](MetricWhen what, const std::string& why, const std::string& of = {}) {
+    not_measured_all(score.values, MetricPlace::reference, {what}, why, of);
   };
   if (experts.empty() || novices.empty()) {
-    no(kRegion,
-       std::string("the reference has no sessions of ") + (experts.empty() ? "experts" : "novices") + (left_out > 0 ? " by others" : ""));
+    no(MetricWhen::regions, std::string("the reference has no sessions of ") +
+                                (experts.empty() ? "experts" : "novices") + (left_out > 0 ? " by others" : ""));
   } else {
     const RegionScore r = score_region(mine, experts, novices);
     score.values.push_back(measured("region_log_ratio", r.log_ratio));
@@ -138,7 +136,7 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
     score.values.push_back(measured("region_thesis", r.thesis));
   }
   if (structures == nullptr) {
-    no(kBand, "the case has no structures");
+    no(MetricWhen::bands, "the case has no structures");
     return;
   }
   constexpr std::size_t kLeast = 100;  // samples: a second
@@ -150,19 +148,23 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
       if (theirs == o->near.end()) continue;
       for (const NearMetric::Sample& s : theirs->second) {
         force.push_back({static_cast<double>(s.distance_mm), static_cast<double>(s.force_n)});
-        speed.push_back({static_cast<double>(s.distance_mm), static_cast<double>(s.speed_mm_s)});
+        if (!std::isnan(s.speed_mm_s))
+          speed.push_back({static_cast<double>(s.distance_mm), static_cast<double>(s.speed_mm_s)});
       }
     }
     if (force.size() < kLeast) {
-      for (const char* const n : kBand) score.values.push_back(not_measured(n, "experts drilled less than a second near it", name));
+      no(MetricWhen::bands, "experts drilled less than a second near it", name);
       continue;
     }
     const IsotonicQuantile most_force(force, 0.9), most_speed(speed, 0.9);
-    std::size_t harder = 0, faster = 0;
+    std::size_t harder = 0, faster = 0, moved = 0;
     double last_told_s = -1e9;
     for (const NearMetric::Sample& s : samples) {
       const double d = static_cast<double>(s.distance_mm), limit = most_force.at(d);
-      if (static_cast<double>(s.speed_mm_s) > most_speed.at(d)) ++faster;
+      if (!std::isnan(s.speed_mm_s)) {
+        ++moved;
+        if (static_cast<double>(s.speed_mm_s) > most_speed.at(d)) ++faster;
+      }
       if (static_cast<double>(s.force_n) <= limit) continue;
       ++harder;
       if (d <= kNearMm && s.t_s - last_told_s > 1) {
@@ -170,9 +172,12 @@ void by_reference(const ScoreKeeper& keeper, const StructureMap* structures, con
         last_told_s = s.t_s;
       }
     }
-    const auto n = static_cast<double>(samples.size());
-    score.values.push_back(measured(kBand[0], static_cast<double>(harder) / n, name));
-    score.values.push_back(measured(kBand[1], static_cast<double>(faster) / n, name));
+    score.values.push_back(
+        measured("force_above_band_share", static_cast<double>(harder) / static_cast<double>(samples.size()), name));
+    score.values.push_back(
+        moved > 0 && !speed.empty()
+            ? measured("speed_above_band_share", static_cast<double>(faster) / static_cast<double>(moved), name)
+            : not_measured("speed_above_band_share", "no drilling near it is long enough for a speed", name));
   }
 }
 
@@ -196,7 +201,7 @@ void judge(const World& begin, const World& end, const ScoreKeeper& keeper, cons
   for (const auto& [name, voxel] : keeper.removed()) removed.push_back(voxel);
   std::vector<std::string> injured;
   for (const Measured& m : keeper.values()) {
-    if ((m.row->name == "injured_s" || m.row->name == "cut_mm3") && m.value && *m.value > 0) injured.push_back(m.of);
+    if ((m.is("injured_s") || m.is("cut_mm3")) && m.value && *m.value > 0) injured.push_back(m.of);
   }
   const Product product(begin, end, *structures, procedure, std::move(removed), context);
   if (!product.word().empty()) score.words.push_back(product.word());

@@ -13,7 +13,6 @@ namespace osteo::inline assessment {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr double kSameTouchS = 0.1;  // as NearMetric counts them
 
 double second_of(std::uint64_t tick, double rate_hz) {
   return static_cast<double>(tick) / rate_hz;
@@ -44,12 +43,14 @@ std::string_view name_of(EventKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-TimelineKeeper::TimelineKeeper(const EvidenceScene& scene) : scene_(scene) {
+TimelineKeeper::TimelineKeeper(const EvidenceScene& scene) : scene_(scene), motion_(scene.rate_hz) {
   if (scene_.structures == nullptr) return;
   const std::size_t n = scene_.structures->values().size();
   each_.resize(n);
-  touch_.resize(n);
-  injury_.resize(n);
+  for (Hand& hand : hands_) {
+    hand.touch.resize(n);
+    hand.injury.resize(n);
+  }
   for (const std::uint8_t v : scene_.structures->values()) {
     const std::string name = scene_.structures->name_of(v);
     const ProcedureStructure* const p = scene_.procedure == nullptr ? nullptr : scene_.procedure->find(name);
@@ -66,6 +67,7 @@ std::size_t TimelineKeeper::sample_at(std::uint64_t tick) {
     // The instrument lasts until another comes.
     line_.tool.resize(size, line_.tool.empty() ? std::uint8_t{0} : line_.tool.back());
     for (auto* const values : {&line_.force_n, &line_.speed_mm_s, &line_.removed_mm3}) values->resize(size, 0);
+    speeds_known_.resize(size, 0);
     line_.distance_mm.resize(size, kNan);
     line_.at_mm.resize(size, line_.at_mm.empty() ? std::array<float, 3>{} : line_.at_mm.back());
   }
@@ -99,8 +101,8 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
       line_.structure[sample] = value;
     }
     if (d > 0) continue;
-    Near& now = turns ? injury_[s] : touch_[s];
-    if (now.on && second_of(t.tick - now.last_tick, f.rate_hz) <= kSameTouchS) {
+    Near& now = turns ? hands_[t.hand].injury[s] : hands_[t.hand].touch[s];
+    if (!now.contact.begins(t.tick, f.rate_hz, kSameContactS)) {
       if (now.event < line_.events.size()) line_.events[now.event].end_s = t_s;
     } else {
       const std::string name = scene_.structures->name_of(value);
@@ -109,8 +111,6 @@ void TimelineKeeper::near(const EvidenceFrame& f, const TickRecord& t, std::size
                              : (saw ? "the saw, at rest, touched the " : "the burr, at rest, touched the ") + name,
                        name, true, at});
     }
-    now.on = true;
-    now.last_tick = t.tick;
   }
 }
 
@@ -145,9 +145,11 @@ void TimelineKeeper::act(const SceneAction& a, double rate_hz) {
 void TimelineKeeper::frame(const EvidenceFrame& f) {
   for (const SceneAction& a : f.actions) act(a, f.rate_hz);
   if (f.lost_before > 0) {
-    last_ = {};
-    for (auto* const all : {&touch_, &injury_}) {
-      for (Near& n : *all) n.on = false;
+    motion_.forget();
+    for (Hand& hand : hands_) {
+      for (auto* const all : {&hand.touch, &hand.injury}) {
+        for (Near& n : *all) n.contact.forget();
+      }
     }
   }
   for (const TickRecord& t : f.ticks) {
@@ -170,14 +172,17 @@ void TimelineKeeper::frame(const EvidenceFrame& f) {
       last_tool_ = now;
     }
     if ((t.flags & (kPoseInvalid | kPoseJumped)) != 0) {
-      last_ = {};
+      motion_.forget();
       continue;
     }
-    const Vec3 at = from_floats(t.device.position_mm);
     line_.at_mm[n] = t.device.position_mm;
-    // Ways are summed here and divided by the sample's time when it is asked for.
-    if (last_.known && t.tick == last_.tick + 1) line_.speed_mm_s[n] += static_cast<float>(length(at - last_.at_mm));
-    last_ = {true, at, t.tick};
+    motion_.add(t.tick, from_floats(t.device.position_mm));
+    // Speeds are summed here and divided by their number when it is asked for.
+    if (const auto speed = motion_.speed_mm_s()) {
+      const std::size_t then = sample_at(motion_.speed_tick());
+      line_.speed_mm_s[then] += static_cast<float>(*speed);
+      ++speeds_known_[then];
+    }
   }
 }
 
@@ -229,7 +234,7 @@ void TimelineKeeper::gap(const Gap& g) {
 Timeline TimelineKeeper::timeline(const std::map<VoxelKey, VisibilityMetric::Voxel>& voxels) const {
   Timeline line = line_;
   const std::size_t size = line.size();
-  for (std::size_t n = 0; n < size; ++n) line.speed_mm_s[n] *= static_cast<float>(Timeline::kRateHz);
+  for (std::size_t n = 0; n < size; ++n) line.speed_mm_s[n] /= static_cast<float>(std::max(speeds_known_[n], 1U));
   for (auto* const values : {&line.seen_mm3, &line.hidden_mm3, &line.unknown_mm3}) values->assign(size, 0);
   for (const auto& [name, v] : voxels) {
     const std::size_t n = sample_of(v.tick, scene_.rate_hz);

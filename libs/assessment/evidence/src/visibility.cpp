@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "osteo/simulation/bone/instrument.h"
+#include "osteo/assessment/evidence/hand_motion.h"
 #include "osteo/geometry/grid/brick_places.h"
 
 namespace osteo::inline assessment {
@@ -130,14 +131,17 @@ void VisibilityMetric::frame(const EvidenceFrame& f) {
   }
   if (removed.empty()) return;
   std::vector<Head> heads;
+  PerHand<std::optional<Head>> last;
   for (const TickRecord& t : f.ticks) {
     if (t.removed_mm3 <= 0) continue;
     const Instrument& tool = instrument_of(t.device.tool);
     const Head h{from_floats(t.device.position_mm), normalized(from_floats(t.device.axis)), tool.head, t.device.tool};
-    // Heads nearly where the one before was add nothing.
-    if (!heads.empty() && heads.back().tool == h.tool && length(heads.back().at_mm - h.at_mm) < 0.02 &&
-        dot(heads.back().axis, h.axis) > 0.9999)
+    // Heads nearly where the hand's one before was add nothing.
+    std::optional<Head>& before = last[t.hand];
+    if (before && before->tool == h.tool && length(before->at_mm - h.at_mm) < 0.02 &&
+        dot(before->axis, h.axis) > 0.9999)
       continue;
+    before = h;
     heads.push_back(h);
   }
   const BoneSight sight(f.world);
@@ -181,15 +185,14 @@ void VisibilityMetric::finish(const World& world, std::vector<Measured>& values,
   }
   const std::string why = voxels_.empty() ? "nothing was removed" : "the session has no camera notes";
   if (seen + hidden == 0) {
-    for (const char* const name : {"seen_share", "hidden_mm3"}) values.push_back(not_measured(name, why));
-    values.push_back(not_measured("hidden_near_mm3", why));
+    not_measured_all(values, MetricPlace::sight, {MetricWhen::camera, MetricWhen::structures}, why);
     return;
   }
   values.push_back(measured("seen_share", seen / (seen + hidden)));
   values.push_back(measured("hidden_mm3", hidden));
   if (unknown > 0) values.push_back(measured("sight_unknown_mm3", unknown));
   if (scene_.structures == nullptr) {
-    values.push_back(not_measured("hidden_near_mm3", "the case has no structures"));
+    not_measured_all(values, MetricPlace::sight, {MetricWhen::structures}, "the case has no structures");
     return;
   }
   for (const std::uint8_t s : scene_.structures->values())

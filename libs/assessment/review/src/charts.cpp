@@ -243,7 +243,8 @@ sheet::Drawing profile_chart(const ForceProfile& p, bool reference) {
 
 std::string_view plain_name(std::string_view metric) {
   struct Row {
-    std::string_view metric, plain;
+    MetricName metric;
+    std::string_view plain;
   };
   static constexpr Row kRows[] = {{"items_passed", "items passed"},
                                   {"seen_share", "bone seen as it went"},
@@ -260,7 +261,7 @@ std::string_view plain_name(std::string_view metric) {
                                   {"rate_mm3_per_s", "bone for each second"},
                                   {"path_mm", "way of the tip"}};
   for (const Row& r : kRows) {
-    if (r.metric == metric) return r.plain;
+    if (r.metric.row().name == metric) return r.plain;
   }
   return metric;
 }
@@ -268,11 +269,7 @@ std::string_view plain_name(std::string_view metric) {
 std::string told_value(const MetricRow& row, double v) {
   if (row.unit == "s") return told_seconds(v);
   if (row.name.ends_with("_share")) return format_number(std::round(1000 * v) / 10) + " %";
-  const std::string unit = row.unit == "mm3"     ? "mm³"
-                           : row.unit == "mm2"   ? "mm²"
-                           : row.unit == "mm3/s" ? "mm³/s"
-                           : row.unit == "1"     ? ""
-                                                 : std::string(row.unit);
+  const std::string unit = unit_text(row.unit);
   return told_number(v) + (unit.empty() ? "" : " " + unit);
 }
 

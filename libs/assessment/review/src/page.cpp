@@ -46,9 +46,9 @@ std::string figure(const ReviewPicture& p, bool caption) {
          (caption ? "<figcaption>" + e(p.caption) + "</figcaption>" : "") + "</figure>\n";
 }
 
-std::optional<double> value_of(const Score& score, std::string_view name) {
+std::optional<double> value_of(const Score& score, MetricName name) {
   for (const Measured& m : score.values) {
-    if (m.row->name == name && m.of.empty()) return m.value;
+    if (m.is(name) && m.of.empty()) return m.value;
   }
   return std::nullopt;
 }
@@ -62,11 +62,11 @@ std::string key_figures(const Review& r) {
   if (!r.score.items.empty() && r.score.judged() > 0)
     put(std::to_string(r.score.passed()) + " of " + std::to_string(r.score.judged()), "items passed");
   if (const auto v = value_of(r.score, "seen_share"))
-    put(told_value(metric_row("seen_share"), *v), "of the bone that is gone was seen as it went");
+    put(told_value(MetricName("seen_share").row(), *v), "of the bone that is gone was seen as it went");
   double touches = 0;
   bool any = false;
   for (const Measured& m : r.score.values) {
-    if (m.row->name != "touches" || !m.value) continue;
+    if (!m.is("touches") || !m.value) continue;
     any = true;
     touches += *m.value;
   }
@@ -305,7 +305,7 @@ void tables(std::ostream& out, const Review& r) {
     out << "<section id=\"items\"><h2>The "
            "scale</h2>\n<table><thead><tr><th>item</th><th>value</th><th>asked</th><th>margin</th><th></th></tr></thead><tbody>\n";
     for (const Product::Result& i : r.score.items) {
-      const std::string unit = i.unit == "1" || i.unit.empty() ? "" : i.unit == "mm3" ? " mm³" : i.unit == "mm2" ? " mm²" : " " + i.unit;
+      const std::string unit = unit_text(i.unit).empty() ? "" : " " + unit_text(i.unit);
       out << "<tr><td>" << e(i.item->name) << "</td>";
       if (i.measured) {
         out << "<td class=\"n\">" << e(told_number(i.value) + unit) << "</td><td class=\"n\">" << e(told_number(i.threshold) + unit)
@@ -324,7 +324,7 @@ void tables(std::ostream& out, const Review& r) {
         const auto& [name, state] = r.score.steps[n];
         out << (n > 0 ? "; " : "") << e(name) << " &#8211; " << e(state);
         for (const Measured& m : r.score.values) {
-          if (m.row->name == "step_s" && m.of == name && m.value && *m.value > 0) out << ", " << e(told_value(*m.row, *m.value));
+          if (m.is("step_s") && m.of == name && m.value && *m.value > 0) out << ", " << e(told_value(*m.row, *m.value));
         }
       }
       out << ".</p>\n";

@@ -46,14 +46,19 @@ Told told_of(const Opened& o, World begin, const Procedure* procedure, const Ref
   return t;
 }
 
+// What is shown beside others' sessions, in this order.
+constexpr MetricName kCompared[] = {"items_passed", "seen_share",   "hidden_mm3",     "hidden_near_mm3", "touches",
+                                    "injured_s",    "clearance_mm", "force_p95_n",    "force_peak_n",    "duration_s",
+                                    "drilling_s",   "removed_mm3",  "rate_mm3_per_s", "path_mm"};
+
 // Values of a metric as one: those of several structures are added up, of the least distance the least is taken.
 std::optional<double> one_value(const Score& score, const MetricRow& row) {
   std::optional<double> v;
   for (const Measured& m : score.values) {
-    if (m.row != &row || !m.value) continue;
+    if (m.row->name != row.name || !m.value) continue;
     if (!v) {
       v = m.value;
-    } else if (row.name == "clearance_mm") {
+    } else if (m.is("clearance_mm")) {
       v = std::min(*v, *m.value);
     } else if (row.name.ends_with("_share")) {
       v = std::max(*v, *m.value);
@@ -194,9 +199,8 @@ Review make_review(const ReviewRequest& q, const Context& context) {
   r.profiles = profiles_of(detail, reference ? &*reference : nullptr, q.subject, structures, procedure);
   for (const Other& other : others) ++(other.of == Other::Of::earlier ? r.earlier : other.of == Other::Of::expert ? r.experts : r.novices);
   if (!others.empty()) {
-    for (const char* const name : {"items_passed", "seen_share", "hidden_mm3", "hidden_near_mm3", "touches", "injured_s", "clearance_mm",
-                                   "force_p95_n", "force_peak_n", "duration_s", "drilling_s", "removed_mm3", "rate_mm3_per_s", "path_mm"}) {
-      Comparison c{&metric_row(name), std::nullopt, {}, {}, {}};
+    for (const MetricName name : kCompared) {
+      Comparison c{&name.row(), std::nullopt, {}, {}, {}};
       c.value = one_value(r.score, *c.row);
       bool any = false;
       for (const Other& other : others) {

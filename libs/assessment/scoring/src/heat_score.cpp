@@ -7,7 +7,7 @@ namespace osteo::inline assessment {
 std::vector<Measured> heat_values(const HeatReader& heat, const StructureMap* structures) {
   std::vector<Measured> values{measured("heat_bone_c", heat.hottest_c())};
   if (structures == nullptr) {
-    for (const char* const name : {"heat_peak_c", "heat_cem43_min"}) values.push_back(not_measured(name, "the case has no structures"));
+    not_measured_all(values, MetricPlace::heat, {MetricWhen::structures}, "the case has no structures");
     return values;
   }
   const auto warm = heat.structures();

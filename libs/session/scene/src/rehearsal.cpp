@@ -394,6 +394,7 @@ RehearsalSummary Rehearsal::finish() {
   s.ticks = operation_.ticks();
   s.removed_mm3 = operation_.removed_mm3();
   s.sawn_mm3 = readers_->tools.sawn_mm3();
+  s.crumbs_mm3 = readers_->tools.crumbs_mm3();
   s.tissue_mm3 = tissue_mm3_;
   s.tissue = tissue();
   // After a failure nobody knows whether all of it went into the stream.

@@ -3,11 +3,16 @@
 namespace osteo::inline session {
 
 void ToolCounts::scene_changed(const World& world, const World::Effect& effect) {
+  double& mm3 = waiting_mm3_.emplace_back(0);
   for (const auto& [name, density] : effect.dust)
-    sawn_mm3_ += static_cast<double>(density) * world.owner(name)->body->bone.frame().voxel_volume_mm3();
+    mm3 += static_cast<double>(density) * world.owner(name)->body->bone.frame().voxel_volume_mm3();
 }
 
 void ToolCounts::action(const SceneAction& action) {
+  if (row_of(action).changes_world && !waiting_mm3_.empty()) {
+    (action.is(ActionKind::split) ? crumbs_mm3_ : sawn_mm3_) += waiting_mm3_.front();
+    waiting_mm3_.pop_front();
+  }
   undone_ += action.is(ActionKind::undo) ? 1 : 0;
 }
 

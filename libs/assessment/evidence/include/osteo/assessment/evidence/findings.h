@@ -64,6 +64,8 @@ struct Findings {
                                    const FindingLimits& limits = {});
 /// "osteotome_findings": 1; places with `places`.
 [[nodiscard]] Json findings_json(const Findings& findings, bool places);
+/// A unit as people read it, of its code in tables and JSON: "mm³" of "mm3", nothing of "1" (a share or a count).
+[[nodiscard]] std::string unit_text(std::string_view unit);
 /// For people: "31", "4.2", "0.35", "12 min 3 s".
 [[nodiscard]] std::string told_number(double value);
 [[nodiscard]] std::string told_seconds(double seconds);

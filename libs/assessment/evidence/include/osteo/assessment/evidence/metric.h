@@ -1,5 +1,6 @@
 // What a metric is told of a session, and what it tells.
 #pragma once
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "osteo/simulation/bone/structure_map.h"
 #include "osteo/simulation/bone/world.h"
+#include "osteo/assessment/evidence/metric_table.h"
 #include "osteo/assessment/evidence/procedure.h"
 #include "osteo/simulation/haptics/stream.h"
 #include "osteo/session/recording/session_file.h"
@@ -38,21 +40,7 @@ struct EvidenceFrame {
   std::uint64_t lost_before = 0;         ///< ticks that are not known between the frame before and this one
 };
 
-enum class Better { higher, lower, neither };
 [[nodiscard]] std::string_view name_of(Better better);
-
-/// The declaration of a metric: all that lines, columns, JSON and the table in docs/evidence.md need to know of it.
-struct MetricRow {
-  std::string_view name;  ///< lower case; unit at its end where it has one
-  std::string_view unit;  ///< "1": a share or a count
-  Better better;
-  std::string_view needs;   ///< "": nothing but the ticks; else "camera", "structures", "procedure", "reference"
-  std::string_view source;  ///< where it is from
-  std::string_view help;    ///< one phrase
-};
-[[nodiscard]] std::span<const MetricRow> metric_table();
-/// A defect in the program where there is none.
-[[nodiscard]] const MetricRow& metric_row(std::string_view name);
 
 /// One value, or a word on why there is none.
 struct Measured {
@@ -60,10 +48,14 @@ struct Measured {
   std::string of;  ///< a structure, an instrument, a region; empty: of the whole session
   std::optional<double> value;
   std::string word;  ///< why there is no value; empty where there is
+  [[nodiscard]] bool is(MetricName metric) const { return row->name == metric.row().name; }
   [[nodiscard]] std::string name() const { return of.empty() ? std::string(row->name) : std::string(row->name) + "[" + of + "]"; }
 };
-[[nodiscard]] Measured measured(std::string_view name, double value, std::string of = {});
-[[nodiscard]] Measured not_measured(std::string_view name, std::string why, std::string of = {});
+[[nodiscard]] Measured measured(MetricName name, double value, std::string of = {});
+[[nodiscard]] Measured not_measured(MetricName name, std::string why, std::string of = {});
+/// All metrics of a place that need one of these and have no value, for the same reason; in the table's order.
+void not_measured_all(std::vector<Measured>& values, MetricPlace place, std::initializer_list<MetricWhen> when,
+                      const std::string& why, const std::string& of = {});
 
 /// Something that happened at a time and place: for whoever wants to look at it.
 struct Moment {

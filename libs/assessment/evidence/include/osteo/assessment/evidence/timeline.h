@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "osteo/core/base/json_document.h"
+#include "osteo/assessment/evidence/hand_motion.h"
 #include "osteo/assessment/evidence/metric.h"
 #include "osteo/assessment/evidence/visibility.h"
 #include "osteo/session/recording/session_reader.h"
@@ -46,7 +47,7 @@ struct Timeline {
   std::vector<std::uint8_t> known;      ///< 1: recorded at least in part
   std::vector<std::uint8_t> drilling;   ///< 1: a burr turns and presses on bone at some tick of it
   std::vector<float> force_n;           ///< of burrs on bone, the most
-  std::vector<float> speed_mm_s;        ///< of the first hand's tip: way over time
+  std::vector<float> speed_mm_s;        ///< of the first hand's tip, HandMotion's: mean of those known
   std::vector<float> distance_mm;       ///< burr's surface to the nearest structure, the least; NaN where none is within reach
   std::vector<std::uint8_t> structure;  ///< which that is: its value in the label map; 0: none
   std::vector<float> removed_mm3;       ///< by burrs in this sample, what was taken back later too
@@ -78,9 +79,11 @@ class TimelineKeeper {
 
  private:
   struct Near {
-    bool on = false;
+    Recurrence contact;
     std::size_t event = 0;
-    std::uint64_t last_tick = 0;
+  };
+  struct Hand {
+    std::vector<Near> touch, injury;  // by number in values()
   };
   std::size_t sample_at(std::uint64_t tick);
   std::size_t add(TimelineEvent event);  // its number; kMostEvents where there is no room
@@ -91,13 +94,9 @@ class TimelineKeeper {
   Timeline line_;
   std::vector<std::uint8_t> watched_;  // by number in values()
   std::vector<double> each_;
-  std::vector<Near> touch_, injury_;  // by number in values()
-  struct Last {
-    bool known = false;
-    Vec3 at_mm;
-    std::uint64_t tick = 0;
-  };
-  Last last_;
+  PerHand<Hand> hands_;
+  HandMotion motion_;                        // of the first hand
+  std::vector<std::uint32_t> speeds_known_;  // by sample: ticks whose speed is in it
   int last_tool_ = -1;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> last_slow_;  // kind and number of what is moved or opened -> event
 };

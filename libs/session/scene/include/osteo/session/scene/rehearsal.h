@@ -52,7 +52,8 @@ struct StructureCutEvent {
 struct RehearsalSummary {
   std::uint64_t ticks = 0;
   double removed_mm3 = 0;                 ///< by the burr
-  double sawn_mm3 = 0;                    ///< by the saw, and crumbs of splits
+  double sawn_mm3 = 0;                    ///< by the saw
+  double crumbs_mm3 = 0;                  ///< crumbs of splits
   double tissue_mm3 = 0;                  ///< soft tissue cut off, as at rest
   std::vector<SoftTissue::Facts> tissue;  ///< each body; empty where the scene has none
   std::string bone_hash, surface_hash;

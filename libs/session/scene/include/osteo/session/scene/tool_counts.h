@@ -1,5 +1,7 @@
 // What the tools did, in numbers for the summary.
 #pragma once
+#include <deque>
+#include <numeric>
 #include <set>
 
 #include "osteo/session/scene/reader.h"
@@ -12,8 +14,10 @@ class ToolCounts final : public Reader {
   void action(const SceneAction& action) override;
   void tick(const TickRecord& record, std::span<const VoxelChange> changes) override;
 
-  /// By the saw, and crumbs of splits; what was taken back counts too.
-  [[nodiscard]] double sawn_mm3() const { return sawn_mm3_; }
+  /// By saws alone, as the metric of that name; what was taken back counts too.
+  [[nodiscard]] double sawn_mm3() const { return std::accumulate(waiting_mm3_.begin(), waiting_mm3_.end(), sawn_mm3_); }
+  /// Crumbs that went when bone was taken apart; what was taken back counts too.
+  [[nodiscard]] double crumbs_mm3() const { return crumbs_mm3_; }
   /// Actions that took something back.
   [[nodiscard]] std::uint64_t undone() const { return undone_; }
   /// Tools that have removed bone.
@@ -24,7 +28,8 @@ class ToolCounts final : public Reader {
   [[nodiscard]] std::uint64_t unusable_poses() const { return unusable_poses_; }
 
  private:
-  double sawn_mm3_ = 0;
+  double sawn_mm3_ = 0, crumbs_mm3_ = 0;
+  std::deque<double> waiting_mm3_;  // of changes whose action the stream has yet to tell
   std::set<std::uint8_t> burrs_used_;
   std::uint64_t undone_ = 0, ticks_without_room_ = 0, unusable_poses_ = 0;
 };
